@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+//
+// The linked octree: cells that hold material, and which of them are joined.
+//
+// Links exist on the finest level only. Three rules hold after every call:
+//   1. A leaf larger than a finest cell lies wholly inside, and all finest links that start in it
+//      are connected. So disconnected links are stored at finest leaves alone.
+//   2. Balance: where a node is split, no leaf that touches it (face, edge or corner) is larger
+//      than the node. Children that were deleted count, so that the rule equals that of a full
+//      octree, and every multigrid level inherits it.
+//   3. All leaves that touch one of the four grid points of the shared face of a disconnected link
+//      between two cells are finest. So a corner that hangs is never beside a cut, and the corners
+//      it is interpolated from belong to every cell around it.
+// A uniform grid is the octree with refinement 0.
+//
+// Source  [DGW11] sections 4.1 and 4.2.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "core/body/lattice.hpp"
+#include "core/body/voxelise.hpp"
+
+namespace kerf {
+
+class LinkedOctree {
+ public:
+  struct Node {
+    Vec3i corner{};                 ///< low corner on the finest lattice
+    std::int32_t parent = -1;       ///< node, -1 for a root
+    std::int32_t first_child = -1;  ///< eight consecutive nodes, -1 for a leaf
+    std::uint8_t size_log2 = 0;     ///< side in finest cells: 1 << size_log2
+    std::uint8_t present = 0;       ///< 0: holds no material (deleted), never a leaf of the body
+    std::uint8_t material = 0;      ///< index of the material, of a present leaf
+    std::uint8_t cut_mask = 0;      ///< finest leaves: bit 2 a + s is set if the link along axis a
+                                    ///< to side s (0 low, 1 high) is disconnected
+  };
+
+  /// Coarse to fine: a node is split while it holds an end of a finest link that the surface
+  /// crosses, or of a link between two materials; nodes without an inside centre are deleted.
+  LinkedOctree(const Voxels& voxels, int refinement);
+
+  const Lattice& lattice() const { return lattice_; }
+  int refinement() const { return refinement_; }
+  const std::vector<Node>& nodes() const { return nodes_; }
+
+  /// Present leaves, ascending by (size, z, y, x) of their corner.
+  std::vector<std::int32_t> leaves() const;
+  std::size_t leaf_count() const { return leaf_count_; }
+
+  /// The present leaf that covers finest cell `c`, or -1 (outside the lattice, or no material).
+  std::int32_t leaf_at(const Vec3i& c) const;
+
+  /// Whether the finest cells `c` and `c + 1 along axis` both hold material and are joined.
+  bool connected(const Vec3i& c, int axis) const;
+
+  /// The record of the disconnected link from `c` to its neighbour at +1 along `axis`; null if
+  /// the link is connected or has no end inside.
+  const LinkCut* record(const Vec3i& c, int axis) const;
+  const std::unordered_map<LinkKey, LinkCut>& records() const { return records_; }
+
+  /// Splits leaves until the leaf that covers `c` is finest. Keeps rule 2.
+  void refine_to_finest(const Vec3i& c);
+
+  /// Disconnects the link from `c` to `c + 1 along axis`, both inside, after the refinement that
+  /// rules 1 and 3 ask for; a link that is disconnected already keeps, at each end, the nearer
+  /// point. Returns whether the link was connected before.
+  bool disconnect(const Vec3i& c, int axis, const LinkCut& cut);
+
+  /// Leaves that were split since construction; grows by one for each split.
+  std::size_t splits() const { return splits_; }
+
+  std::size_t bytes() const;
+
+ private:
+  // (helper's choice; keep Node as it is)
+  Lattice lattice_;
+  int refinement_ = 0;
+  Vec3i roots_{};
+  std::vector<std::int32_t> root_;  // dense grid of root nodes, -1: none
+  std::vector<Node> nodes_;
+  std::unordered_map<LinkKey, LinkCut> records_;
+  std::size_t leaf_count_ = 0;
+  std::size_t splits_ = 0;
+};
+
+}  // namespace kerf
