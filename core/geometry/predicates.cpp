@@ -12,9 +12,7 @@ struct Wide3 {
   Int128 x, y, z;
 };
 
-Int3 difference(const Int3& a, const Int3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
+Int3 difference(const Int3& a, const Int3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 Wide3 cross_wide(const Int3& a, const Int3& b) {
   return {static_cast<Int128>(a[1]) * b[2] - static_cast<Int128>(a[2]) * b[1],

@@ -38,7 +38,7 @@ class Quantiser {
 
   /// @throws Error (bad_input) for a position that is not finite or beyond 2^40 units.
   Int3 operator()(const Vec3d& p) const;
-  Vec3d position(const Int3& p) const;  ///< m
+  Vec3d position(const Int3& p) const;   ///< m
   double unit() const { return unit_; }  ///< m
 
  private:

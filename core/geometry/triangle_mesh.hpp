@@ -27,6 +27,8 @@ struct MeshReport {
   std::size_t nonmanifold_edges = 0;   ///< edges of three or more triangles
   std::size_t misoriented_edges = 0;   ///< edges that two triangles traverse in the same direction
   std::size_t degenerate_triangles = 0;///< triangles with a repeated vertex or no area
+  std::size_t unbalanced_edges = 0;    ///< edges not traversed as often forth as back; none: the
+                                       ///< winding number is an integer away from the surface
   double volume = 0;                   ///< signed, m^3; negative for an inverted closed mesh
   bool closed() const { return boundary_edges == 0; }
   bool oriented() const { return misoriented_edges == 0 && nonmanifold_edges == 0; }
