@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: MIT
 //
-// Three-vectors and three-by-three matrices, values only.
+// Three-vectors, three-by-three matrices and quaternions, values only.
 //
 // Layout  Mat3 is row-major: m[row][column].
 #pragma once
 
-#include <cmath>
-
-#include "kernels/host_device.hpp"
+#include "kernels/fma.hpp"
 
 namespace kerf::kernels {
 
@@ -58,7 +56,6 @@ KERF_HD Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
 
 template <class T>
 KERF_HD T norm(const Vec3<T>& a) {
-  using std::sqrt;
   return sqrt(dot(a, a));
 }
 
@@ -107,8 +104,7 @@ template <class T>
 KERF_HD Mat3<T> operator*(const Mat3<T>& a, const Mat3<T>& b) {
   Mat3<T> c;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+    for (int j = 0; j < 3; ++j) c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
   return c;
 }
 
@@ -125,6 +121,136 @@ KERF_HD T determinant(const Mat3<T>& a) {
   return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
          a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
          a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
+}
+
+/// A symmetric matrix, six numbers.
+template <class T>
+struct Sym3 {
+  T xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
+
+  KERF_HD Mat3<T> full() const {
+    Mat3<T> a;
+    a[0][0] = xx;
+    a[1][1] = yy;
+    a[2][2] = zz;
+    a[0][1] = a[1][0] = xy;
+    a[0][2] = a[2][0] = xz;
+    a[1][2] = a[2][1] = yz;
+    return a;
+  }
+  KERF_HD Sym3& operator+=(const Sym3& b) {
+    xx += b.xx;
+    xy += b.xy;
+    xz += b.xz;
+    yy += b.yy;
+    yz += b.yz;
+    zz += b.zz;
+    return *this;
+  }
+};
+
+/// The lower triangle of a matrix that is symmetric up to rounding.
+template <class T>
+KERF_HD Sym3<T> lower_triangle(const Mat3<T>& a) {
+  return {a[0][0], a[1][0], a[2][0], a[1][1], a[2][1], a[2][2]};
+}
+
+template <class T>
+KERF_HD Vec3<T> operator*(const Sym3<T>& a, const Vec3<T>& v) {
+  return {a.xx * v.x + a.xy * v.y + a.xz * v.z, a.xy * v.x + a.yy * v.y + a.yz * v.z,
+          a.xz * v.x + a.yz * v.y + a.zz * v.z};
+}
+
+/// Inverse of a symmetric positive semi-definite block, by L D L^T without branches.
+/// A pivot that cancels to less than a few roundings of its diagonal entry is dropped: its row and
+/// column of the result are zero. So an inactive component (zero row and column) stays untouched,
+/// and a rank-deficient block yields a generalised inverse G with A G A = A, never a NaN.
+///
+/// Needs   A finite and positive semi-definite up to rounding.
+template <class T>
+KERF_HD Sym3<T> inverse_semidefinite(const Sym3<T>& A) {
+  const T tolerance = T(32) * Precision<T>::kEpsilon;
+  const auto reciprocal = [tolerance](const T& pivot, const T& diagonal) {
+    const auto kept = pivot > tolerance * diagonal;
+    return select(kept, T(1) / select(kept, pivot, T(1)), T(0));
+  };
+  const T p0 = reciprocal(A.xx, A.xx);
+  const T l10 = A.xy * p0, l20 = A.xz * p0;
+  const T p1 = reciprocal(A.yy - l10 * A.xy, A.yy);
+  const T c21 = A.yz - l20 * A.xy;
+  const T l21 = c21 * p1;
+  const T p2 = reciprocal(A.zz - l20 * A.xz - l21 * c21, A.zz);
+
+  // Columns of L^-T: (1 0 0), (-l10 1 0), (l10 l21 - l20, -l21, 1).
+  const T k20 = l10 * l21 - l20;
+  Sym3<T> G;
+  G.zz = p2;
+  G.yz = -l21 * p2;
+  G.xz = k20 * p2;
+  G.yy = p1 - l21 * G.yz;
+  G.xy = -l10 * p1 - l21 * G.xz;
+  G.xx = p0 + l10 * l10 * p1 + k20 * G.xz;
+  return G;
+}
+
+/// A^-1 b for a symmetric positive semi-definite A; dropped components yield zero.
+template <class T>
+KERF_HD Vec3<T> solve3(const Sym3<T>& A, const Vec3<T>& b) {
+  return inverse_semidefinite(A) * b;
+}
+template <class T>
+KERF_HD Vec3<T> solve3(const Mat3<T>& A, const Vec3<T>& b) {
+  return inverse_semidefinite(lower_triangle(A)) * b;
+}
+
+/// w + x i + y j + z k; a rotation when of length one. q and -q are the same rotation.
+template <class T>
+struct Quat {
+  T w{T(1)}, x{}, y{}, z{};
+
+  friend KERF_HD bool operator==(const Quat& a, const Quat& b) {
+    return a.w == b.w && a.x == b.x && a.y == b.y && a.z == b.z;
+  }
+};
+
+/// First b, then a.
+template <class T>
+KERF_HD Quat<T> operator*(const Quat<T>& a, const Quat<T>& b) {
+  return {
+      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+
+/// q scaled to length one; the identity where q is zero, or too far from one to be squared, or not
+/// finite.
+template <class T>
+KERF_HD Quat<T> normalised(const Quat<T>& q) {
+  const T squared = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+  const T tiny = T(1e-30);
+  const auto usable = squared > tiny && squared < T(1e30);
+  const T scale = T(1) / sqrt(select(usable, squared, T(1)));
+  return {select(usable, q.w * scale, T(1)), select(usable, q.x * scale, T(0)),
+          select(usable, q.y * scale, T(0)), select(usable, q.z * scale, T(0))};
+}
+
+/// Needs  |q| = 1 up to rounding.
+template <class T>
+KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
+  const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const T xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z;
+  const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
+  const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
+  Mat3<T> R;
+  R[0][0] = T(1) - yy - zz;
+  R[0][1] = xy - wz;
+  R[0][2] = xz + wy;
+  R[1][0] = xy + wz;
+  R[1][1] = T(1) - xx - zz;
+  R[1][2] = yz - wx;
+  R[2][0] = xz - wy;
+  R[2][1] = yz + wx;
+  R[2][2] = T(1) - xx - yy;
+  return R;
 }
 
 }  // namespace kerf::kernels

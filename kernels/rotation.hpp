@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+//
+// The rotation of a cell from its displacements.
+//
+// The energy of [DGW11], section 5, is the integral of |R^T (x + u - c) - (x - c0)|^2. All of it
+// but -2 tr(R^T G), with G the integral of (x + u - c) (x - c0)^T, does not depend on R. x - c0 is
+// side/2 times the xi of modes.hpp, and the products of the xi are orthogonal, so G sees the linear
+// modes of u alone: G = side^5/12 F, with F = I + the mean gradient of u over the cell. The energy
+// is therefore least where tr(R^T F) is greatest over the proper rotations: at the polar factor of
+// F if det F >= 0, and in general at U diag(1, 1, sign det F) V^T of its singular value
+// decomposition. No quadrature is needed, and nothing is lost.
+//
+// A point where S = R^T F is symmetric and tr(S) I - S is positive definite is a maximum, and the
+// only one: the eigenvalues of S then have positive pairwise sums, so at most the smallest in size
+// is negative, which is the decomposition above. Newton's iteration from the rotation of the step
+// before thus carries its own proof; whatever it does not prove goes to the quaternion formulation.
+//
+// Units   F, R, quaternions: ratios; u and side in m.
+// Source  Georgii, Westermann 2008 [GW08]; Horn 1987 [H87].
+#pragma once
+
+#include "kernels/layout.hpp"
+#include "kernels/mat3.hpp"
+
+namespace kerf::kernels {
+
+/// F = I + mean displacement gradient of a cell: the three linear modes over 4 side.
+///
+/// Shapes  u: 8 corners (of the cell, not slots: unfold first).
+template <class T>
+KERF_HD Mat3<T> mean_gradient(const Vec3<T> (&u)[kCorners], T side) {
+  const Vec3<T> mode[3] = {((u[1] - u[0]) + (u[3] - u[2])) + ((u[5] - u[4]) + (u[7] - u[6])),
+                           ((u[2] - u[0]) + (u[3] - u[1])) + ((u[6] - u[4]) + (u[7] - u[5])),
+                           ((u[4] - u[0]) + (u[5] - u[1])) + ((u[6] - u[2]) + (u[7] - u[3]))};
+  const T scale = T(1) / (T(4) * side);
+  Mat3<T> F = Mat3<T>::identity();
+  for (int a = 0; a < 3; ++a)
+    for (int c = 0; c < 3; ++c) F[c][a] += scale * mode[a][c];
+  return F;
+}
+
+template <class T>
+struct RotationStep {
+  Quat<T> next;
+  T length2;    // of the rotation vector, radians squared
+  bool ascent;  // tr(S) I - S was safely positive definite
+};
+
+/// One Newton step for the maximum of tr(R^T F): omega = (tr(S) I - S)^-1 axial(R^T F), applied as
+/// the Cayley quaternion (1, omega / 2). Where that matrix is not safely positive definite, q
+/// stays.
+///
+/// Needs  |q| = 1; F neither so large nor so small that its cube over- or underflows.
+template <class T>
+KERF_HD RotationStep<T> rotation_step(const Mat3<T>& F, const Quat<T>& q) {
+  // det > 1e-3 tr^3 keeps the smallest eigenvalue above 0.4 % of the trace; at rest the ratio is
+  // 0.037, the greatest there is.
+  const T kSafe = T(1e-3);
+  const Mat3<T> A = transpose(to_matrix(q)) * F;
+  const Vec3<T> axial{A[2][1] - A[1][2], A[0][2] - A[2][0], A[1][0] - A[0][1]};
+  const T hxx = A[1][1] + A[2][2], hyy = A[0][0] + A[2][2], hzz = A[0][0] + A[1][1];
+  const T hxy = T(-0.5) * (A[0][1] + A[1][0]);
+  const T hxz = T(-0.5) * (A[0][2] + A[2][0]);
+  const T hyz = T(-0.5) * (A[1][2] + A[2][1]);
+
+  const T cxx = hyy * hzz - hyz * hyz, cxy = hxz * hyz - hxy * hzz, cxz = hxy * hyz - hxz * hyy;
+  const T cyy = hxx * hzz - hxz * hxz, cyz = hxy * hxz - hxx * hyz, czz = hxx * hyy - hxy * hxy;
+  const T det = hxx * cxx + hxy * cxy + hxz * cxz;
+  const T trace = hxx + hyy + hzz;
+  const auto ascent = hxx > T(0) && czz > T(0) && det > kSafe * (trace * trace * trace);
+  const T half = select(ascent, T(0.5) / select(ascent, det, T(1)), T(0));
+  const Vec3<T> w{half * (cxx * axial.x + cxy * axial.y + cxz * axial.z),
+                  half * (cxy * axial.x + cyy * axial.y + cyz * axial.z),
+                  half * (cxz * axial.x + cyz * axial.y + czz * axial.z)};
+  return {normalised(q * Quat<T>{T(1), w.x, w.y, w.z}), T(4) * dot(w, w), ascent};
+}
+
+/// A fixed number of Newton steps; the fast path for cells that are neither inverted nor collapsed.
+/// Two from the rotation of the step before reach 1e-6 from 10 degrees off and 30 % stretch.
+///
+/// Needs  as rotation_step. An inverted cell may keep `start` or reach no maximum:
+/// extract_rotation.
+template <class T>
+KERF_HD Quat<T> rotation_newton(const Mat3<T>& F, Quat<T> start, int iterations) {
+  for (int i = 0; i < iterations; ++i) start = rotation_step(F, start).next;
+  return start;
+}
+
+/// Horn's matrix N with tr(R(q)^T F) = q^T N q for a unit quaternion q = (w, x, y, z).
+template <class T>
+KERF_HD void horn_matrix(const Mat3<T>& F, T (&N)[4][4]) {
+  N[0][0] = F[0][0] + F[1][1] + F[2][2];
+  N[1][1] = F[0][0] - F[1][1] - F[2][2];
+  N[2][2] = F[1][1] - F[0][0] - F[2][2];
+  N[3][3] = F[2][2] - F[0][0] - F[1][1];
+  N[0][1] = N[1][0] = F[2][1] - F[1][2];
+  N[0][2] = N[2][0] = F[0][2] - F[2][0];
+  N[0][3] = N[3][0] = F[1][0] - F[0][1];
+  N[1][2] = N[2][1] = F[0][1] + F[1][0];
+  N[1][3] = N[3][1] = F[0][2] + F[2][0];
+  N[2][3] = N[3][2] = F[1][2] + F[2][1];
+}
+
+/// One Jacobi rotation that zeroes N[p][q]; the columns of V collect the eigenvectors.
+template <class T>
+KERF_HD void jacobi_rotate(T (&N)[4][4], T (&V)[4][4], int p, int q) {
+  // tan of the smaller angle, 2 b / (d + sign(d) sqrt(d^2 + 4 b^2)): no cancellation, no branch on
+  // a quotient, zero where the entry is zero.
+  const T b = N[p][q], d = N[q][q] - N[p][p];
+  const T root = sqrt(d * d + T(4) * (b * b));
+  const T below = d + (d < T(0) ? -root : root);
+  const T t = below != T(0) ? (b + b) / below : T(0);
+  const T c = T(1) / sqrt(T(1) + t * t), s = t * c;
+  for (int k = 0; k < 4; ++k) {
+    const T kp = N[k][p], kq = N[k][q];
+    N[k][p] = c * kp - s * kq;
+    N[k][q] = s * kp + c * kq;
+  }
+  for (int k = 0; k < 4; ++k) {
+    const T pk = N[p][k], qk = N[q][k];
+    N[p][k] = c * pk - s * qk;
+    N[q][k] = s * pk + c * qk;
+  }
+  N[p][q] = N[q][p] = T(0);
+  for (int k = 0; k < 4; ++k) {
+    const T kp = V[k][p], kq = V[k][q];
+    V[k][p] = c * kp - s * kq;
+    V[k][q] = s * kp + c * kq;
+  }
+}
+
+/// The maximum of tr(R^T F) as the dominant eigenvector of Horn's matrix. Where several rotations
+/// are equally good (a collapsed or an inverted, equally stretched cell), the one nearest to
+/// `start`.
+///
+/// Needs  |start| = 1; the greatest entry of F near 1.
+template <class T>
+KERF_HD Quat<T> rotation_horn(const Mat3<T>& F, const Quat<T>& start) {
+  constexpr int kSweeps = 8;  // quadratic convergence: double needs 5 or 6; a fixed count for lanes
+  T N[4][4], V[4][4] = {};
+  horn_matrix(F, N);
+  for (int k = 0; k < 4; ++k) V[k][k] = T(1);
+  for (int sweep = 0; sweep < kSweeps; ++sweep)
+    for (int p = 0; p < 3; ++p)
+      for (int q = p + 1; q < 4; ++q) jacobi_rotate(N, V, p, q);
+
+  int best = 0;
+  for (int k = 1; k < 4; ++k)
+    if (N[k][k] > N[best][best]) best = k;
+  // The sweeps leave some tens of roundings of the greatest entry of F, which is 1, on an
+  // eigenvalue.
+  const T tie = N[best][best] - T(64) * Precision<T>::kEpsilon;
+  const T from[4] = {start.w, start.x, start.y, start.z};
+  T near[4] = {};
+  T length2 = T(0);
+  for (int k = 0; k < 4; ++k) {
+    if (N[k][k] < tie) continue;
+    const T share = from[0] * V[0][k] + from[1] * V[1][k] + from[2] * V[2][k] + from[3] * V[3][k];
+    length2 += share * share;
+    for (int i = 0; i < 4; ++i) near[i] += share * V[i][k];
+  }
+  // A start orthogonal to all of the best (180 degrees off) has no nearest: take the first.
+  if (length2 < T(1e-6)) return normalised(Quat<T>{V[0][best], V[1][best], V[2][best], V[3][best]});
+  return normalised(Quat<T>{near[0], near[1], near[2], near[3]});
+}
+
+/// F over its greatest entry in size; all zero if F is zero, and if it is not finite.
+template <class T>
+KERF_HD Mat3<T> scaled_to_one(const Mat3<T>& F) {
+  T greatest = T(0);
+  bool finite = true;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const T size = F[i][j] < T(0) ? -F[i][j] : F[i][j];
+      finite = finite && size - size == T(0);
+      greatest = size > greatest ? size : greatest;
+    }
+  Mat3<T> out;
+  if (!finite || greatest == T(0)) return out;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out[i][j] = F[i][j] / greatest;
+  return out;
+}
+
+/// The proper rotation of least element energy for any F, inverted, flat or collapsed ones
+/// included. Newton from `start` to round-off; Horn's quaternion where Newton proves nothing.
+/// Deterministic, never NaN: F = 0, or one that is not finite, keeps `start`.
+///
+/// Source  [DGW11], section 5; [H87].
+template <class T>
+KERF_HD Quat<T> extract_rotation(const Mat3<T>& F, const Quat<T>& start) {
+  constexpr int kIterations = 8;  // 4 from 60 degrees off
+  // A step this small is followed by an error of its square, well below rounding.
+  const T kSmall2 = T(0.01) * Precision<T>::kEpsilon;
+  const Mat3<T> scaled = scaled_to_one(F);
+  const Quat<T> first = normalised(start);
+  Quat<T> q = first;
+  for (int i = 0; i < kIterations; ++i) {
+    const RotationStep<T> step = rotation_step(scaled, q);
+    if (!step.ascent) break;
+    q = step.next;
+    if (step.length2 <= kSmall2) return q;
+  }
+  return rotation_horn(scaled, first);
+}
+
+}  // namespace kerf::kernels
