@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+# Enables CUDA where an nvcc of version 12 or newer works; leaves it off, or stops if KERF_CUDA
+# asks for it, where none does.
+find_program(KERF_NVCC nvcc PATHS /usr/local/cuda/bin)
+mark_as_advanced(KERF_NVCC)
+if(KERF_NVCC AND NOT CMAKE_CUDA_COMPILER)
+  execute_process(COMMAND ${KERF_NVCC} --version OUTPUT_VARIABLE banner ERROR_QUIET)
+  if(banner MATCHES "release ([0-9.]+)" AND CMAKE_MATCH_1 VERSION_GREATER_EQUAL 12)
+    if(NOT DEFINED ENV{CUDACXX})
+      set(ENV{CUDACXX} ${KERF_NVCC})
+    endif()
+    include(CheckLanguage)
+    check_language(CUDA)
+  endif()
+endif()
+if(KERF_CUDA AND NOT CMAKE_CUDA_COMPILER)
+  message(FATAL_ERROR "KERF_CUDA is on, but no nvcc of version 12 or newer was found. "
+    "Install the CUDA toolkit, or name the compiler in CUDACXX, or configure with -DKERF_CUDA=OFF.")
+endif()
+if(CMAKE_CUDA_COMPILER)
+  if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+    set(CMAKE_CUDA_ARCHITECTURES 90-real)
+  endif()
+  enable_language(CUDA)
+  set(CMAKE_CUDA_STANDARD 20)
+  set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+endif()
