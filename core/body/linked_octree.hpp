@@ -62,7 +62,7 @@ class LinkedOctree {
   const LinkCut* record(const Vec3i& c, int axis) const;
   const std::unordered_map<LinkKey, LinkCut>& records() const { return records_; }
 
-  /// Splits leaves until the leaf that covers `c` is finest. Keeps rule 2.
+  /// Splits leaves until the leaf that covers `c`, if there is one, is finest. Keeps rule 2.
   void refine_to_finest(const Vec3i& c);
 
   /// Disconnects the link from `c` to `c + 1 along axis`, both inside, after the refinement that
@@ -76,7 +76,17 @@ class LinkedOctree {
   std::size_t bytes() const;
 
  private:
-  // (helper's choice; keep Node as it is)
+  class Pyramid;
+
+  std::int32_t append_node(const Vec3i& corner, int size_log2, std::int32_t parent);
+  std::int32_t append_children(std::int32_t node);
+  void build(const Voxels& voxels, const Pyramid& pyramid, std::int32_t node);
+  void disconnect_surface(const Voxels& voxels);
+  void split(std::int32_t leaf);
+  std::int32_t child_at(std::int32_t node, const Vec3i& c) const;
+  void balance(std::vector<std::int32_t>& split_nodes);
+  void mark(const Vec3i& c, int axis);
+
   Lattice lattice_;
   int refinement_ = 0;
   Vec3i roots_{};
