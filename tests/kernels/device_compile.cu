@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+//
+// Compiled wherever nvcc is found, never run: the headers of kernels/ must be code for a device,
+// templates instantiated, also while no backend calls them there.
+#include "kernels/coarsen.hpp"
+#include "kernels/corotate.hpp"
+#include "kernels/fma.hpp"
+#include "kernels/hex_element.hpp"
+#include "kernels/host_device.hpp"
+#include "kernels/layout.hpp"
+#include "kernels/mat3.hpp"
+#include "kernels/modes.hpp"
+#include "kernels/relax.hpp"
+#include "kernels/residual.hpp"
+#include "kernels/rotation.hpp"
+#include "kernels/transfer.hpp"
+
+namespace kerf::kernels {
+
+/// One thread a cell: its rotation, its matrix, the matrix of its parent, and one relaxation.
+template <class T>
+__global__ void touch_all(const Vec3<T>* displacement, Quat<T>* rotation, T* matrices, T* coarse,
+                          Vec3<T>* force, int cells, T side, T poisson, FoldCode fold) {
+  const int cell = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (cell >= cells) return;
+  Vec3<T> slots[kCorners], corners[kCorners], f[kCorners];
+  for (int i = 0; i < kCorners; ++i) slots[i] = displacement[kCorners * cell + i];
+  unfold(slots, fold, corners);
+  rotation[cell] = extract_rotation(mean_gradient(corners, side), rotation[cell]);
+  const Mat3<T> R = to_matrix(rotation[cell]);
+
+  const ModeConstants<T> constants = mode_constants(poisson, MassModel::consistent);
+  apply_cell(corners, R, side, side, constants, f);
+  elastic_force(f, R, side, side, constants.stiffness, f);
+  fold_transpose(f, fold, slots);
+
+  constexpr int kTileLog2 = 5;
+  const auto matrix = cell_entries(matrices, cell, kEntries, kTileLog2);
+  const HexStiffness<T> K = unit_hex_stiffness(poisson);
+  const HexMass<T> M = unit_hex_mass<T>();
+  cell_matrix(K, M, R, side, side, matrix);
+  T weights[kCorners][kCorners];
+  transfer_weights(fold, cell % kCorners, FoldCode{0}, weights);
+  coarsen_cell(matrix, weights, cell_entries(coarse, cell, kEntries, kTileLog2));
+
+  apply_packed(matrix, slots, corners);
+  const Vec3<T> row = apply_packed_row(matrix, 0, slots);
+  force[cell] = relax_vertex(corners[0], row, packed_block<T>(matrix, 0, 0), T(1));
+  force[cell] = relax_vertex(force[cell], row,
+                             inverse_semidefinite(cell_diagonal(K, M, R, side, side, 0)), T(1));
+}
+
+template __global__ void touch_all<float>(const Vec3<float>*, Quat<float>*, float*, float*,
+                                          Vec3<float>*, int, float, float, FoldCode);
+template __global__ void touch_all<double>(const Vec3<double>*, Quat<double>*, double*, double*,
+                                           Vec3<double>*, int, double, double, FoldCode);
+
+}  // namespace kerf::kernels
