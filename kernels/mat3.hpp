@@ -161,25 +161,56 @@ KERF_HD Vec3<T> operator*(const Sym3<T>& a, const Vec3<T>& v) {
           a.xz * v.x + a.yz * v.y + a.zz * v.z};
 }
 
-/// Inverse of a symmetric positive semi-definite block, by L D L^T without branches.
-/// A pivot that cancels to less than a few roundings of its diagonal entry is dropped: its row and
-/// column of the result are zero. So an inactive component (zero row and column) stays untouched,
-/// and a rank-deficient block yields a generalised inverse G with A G A = A, never a NaN.
+template <class T, class Mask>
+KERF_HD void swap_if(const Mask& mask, T& a, T& b) {
+  const T kept = a;
+  a = select(mask, b, a);
+  b = select(mask, kept, b);
+}
+
+/// Exchanges two components of a symmetric matrix, rows and columns alike, where the mask holds.
+template <class T, class Mask>
+KERF_HD void swap_xy_if(const Mask& mask, Sym3<T>& a) {
+  swap_if(mask, a.xx, a.yy);
+  swap_if(mask, a.xz, a.yz);
+}
+template <class T, class Mask>
+KERF_HD void swap_xz_if(const Mask& mask, Sym3<T>& a) {
+  swap_if(mask, a.xx, a.zz);
+  swap_if(mask, a.xy, a.yz);
+}
+template <class T, class Mask>
+KERF_HD void swap_yz_if(const Mask& mask, Sym3<T>& a) {
+  swap_if(mask, a.yy, a.zz);
+  swap_if(mask, a.xy, a.xz);
+}
+
+/// Inverse of a symmetric positive semi-definite block, by L D L^T with the greatest pivot first
+/// and without branches. A pivot below some roundings of the trace is dropped: its row and column
+/// of the result are zero. So an inactive component (zero row and column) stays untouched, and a
+/// rank-deficient block yields a generalised inverse G with A G A = A, never a NaN.
 ///
 /// Needs   A finite and positive semi-definite up to rounding.
 template <class T>
-KERF_HD Sym3<T> inverse_semidefinite(const Sym3<T>& A) {
-  const T tolerance = T(32) * Precision<T>::kEpsilon;
-  const auto reciprocal = [tolerance](const T& pivot, const T& diagonal) {
-    const auto kept = pivot > tolerance * diagonal;
+KERF_HD Sym3<T> inverse_semidefinite(Sym3<T> A) {
+  const T least = T(32) * Precision<T>::kEpsilon * (A.xx + A.yy + A.zz);
+  const auto reciprocal = [least](const T& pivot) {
+    const auto kept = pivot > least;
     return select(kept, T(1) / select(kept, pivot, T(1)), T(0));
   };
-  const T p0 = reciprocal(A.xx, A.xx);
+  const auto y_first = A.yy > A.xx;
+  swap_xy_if(y_first, A);
+  const auto z_first = A.zz > A.xx;
+  swap_xz_if(z_first, A);
+  const T p0 = reciprocal(A.xx);
+  const auto z_second = A.zz - A.xz * p0 * A.xz > A.yy - A.xy * p0 * A.xy;
+  swap_yz_if(z_second, A);
+
   const T l10 = A.xy * p0, l20 = A.xz * p0;
-  const T p1 = reciprocal(A.yy - l10 * A.xy, A.yy);
+  const T p1 = reciprocal(A.yy - l10 * A.xy);
   const T c21 = A.yz - l20 * A.xy;
   const T l21 = c21 * p1;
-  const T p2 = reciprocal(A.zz - l20 * A.xz - l21 * c21, A.zz);
+  const T p2 = reciprocal(A.zz - l20 * A.xz - l21 * c21);
 
   // Columns of L^-T: (1 0 0), (-l10 1 0), (l10 l21 - l20, -l21, 1).
   const T k20 = l10 * l21 - l20;
@@ -190,6 +221,9 @@ KERF_HD Sym3<T> inverse_semidefinite(const Sym3<T>& A) {
   G.yy = p1 - l21 * G.yz;
   G.xy = -l10 * p1 - l21 * G.xz;
   G.xx = p0 + l10 * l10 * p1 + k20 * G.xz;
+  swap_yz_if(z_second, G);
+  swap_xz_if(z_first, G);
+  swap_xy_if(y_first, G);
   return G;
 }
 
