@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: MIT
+#include "core/body/cut.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.hpp"
+#include "core/body/cell_map.hpp"
+#include "core/geometry/bvh.hpp"
+#include "core/geometry/predicates.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr double kMaxBladeRatio = 1e6;
+
+/// A crossing of one half of a link.
+struct Hit {
+  LinkKey key = 0;
+  int end = 0;      ///< whose half it is: 0 the lower cell's
+  double t = 0;     ///< 0 at that cell's centre, 1 at the centre of the shared face
+  Vec3f normal{};   ///< unit, reference state
+};
+
+double largest(const Vec3d& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+/// A triangle on the integer lattice, and its plane in doubles for quick rejection.
+struct BladeTriangle {
+  std::array<Int3, 3> points{};
+  Box3 box;         ///< with the margin that covers rounding
+  Vec3d normal{};   ///< unit
+  Vec3d point{};
+  double margin = 0;
+
+  bool near_plane(const Box3& b) const {
+    const Vec3d to_center = 0.5 * b.lo + 0.5 * b.hi - point;
+    double reach = margin;
+    for (int d = 0; d < 3; ++d) reach += 0.5 * std::abs(normal[d]) * (b.hi[d] - b.lo[d]);
+    return std::abs(dot(normal, to_center)) <= reach;
+  }
+};
+
+/// The unit normal of a triangle of integers, exact but for its rounding; 0 if it has no area.
+Vec3d unit_normal(const std::array<Int3, 3>& p) {
+  std::int64_t u[3], v[3];
+  for (std::size_t d = 0; d < 3; ++d) {
+    u[d] = p[1][d] - p[0][d];
+    v[d] = p[2][d] - p[0][d];
+  }
+  Vec3d n;
+  for (int d = 0; d < 3; ++d) {
+    const int i = (d + 1) % 3, j = (d + 2) % 3;
+    n[d] = static_cast<double>(static_cast<Int128>(u[i]) * v[j] - static_cast<Int128>(u[j]) * v[i]);
+  }
+  const double length = norm(n);  // at most 2^84: no overflow, and no underflow of integers
+  return length > 0 ? (1 / length) * n : Vec3d{};
+}
+
+void inflate(Box3& box, double by) {
+  box.lo -= {by, by, by};
+  box.hi += {by, by, by};
+}
+
+Box3 box_of(const CellMap& cell, const Vec3i& low, std::int32_t size) {
+  Box3 box;
+  for (int i = 0; i < 8; ++i)
+    box.add(cell.position({2 * (low[0] + (i & 1) * size), 2 * (low[1] + (i >> 1 & 1) * size),
+                           2 * (low[2] + (i >> 2) * size)}));
+  return box;
+}
+
+/// The union of what the quantiser must map, grown in steps of four from the body alone: blades of
+/// like size are rounded alike, so that a sweep in parts cuts as the whole sweep does.
+Box3 quantiser_box(const Box3& body, const Box3& blade) {
+  const Vec3d center = 0.5 * body.lo + 0.5 * body.hi;
+  double half = largest(body.extent());
+  Box3 box;
+  do {
+    half *= 4;
+    box = {center - Vec3d{half, half, half}, center + Vec3d{half, half, half}};
+  } while (!(box.contains(blade.lo) && box.contains(blade.hi)) && std::isfinite(half));
+  return box;
+}
+
+/// Finds the links that a blade crosses.
+class LinkSearch {
+ public:
+  LinkSearch(const LinkedOctree& body, std::span<const Vec3d> corners, const Box3& body_box,
+             const Box3& blade_box)
+      : body_(body),
+        corners_(corners),
+        leaves_(body.leaves()),
+        tree_(leaf_boxes()),
+        quantiser_(quantiser_box(body_box, blade_box)),
+        tested_(leaves_.size(), -1) {
+    const Lattice& lattice = body.lattice();
+    // Small query boxes along a slanted triangle, but not too many if the body has grown.
+    reach_ = std::max(4 * lattice.spacing, largest(body_box.extent()) / 256);
+    const double coordinate = std::max({largest(body_box.lo), largest(body_box.hi),
+                                        largest(blade_box.lo), largest(blade_box.hi)});
+    margin_ = 4 * quantiser_.unit() + 32 * std::numeric_limits<double>::epsilon() * coordinate;
+  }
+
+  /// Adds the crossings with one triangle.
+  void add(const std::array<Vec3d, 3>& triangle) {
+    ++number_;
+    for (std::size_t i = 0; i < 3; ++i) blade_.points[i] = quantiser_(triangle[i]);
+    blade_.normal = unit_normal(blade_.points);
+    if (blade_.normal == Vec3d{}) return;
+    blade_.point = quantiser_.position(blade_.points[0]);
+    blade_.margin = margin_;
+    blade_.box = {};
+    for (const Vec3d& p : triangle) blade_.box.add(p);
+    inflate(blade_.box, margin_);
+    search(triangle);
+  }
+
+  /// All crossings so far, by link.
+  std::vector<Hit> take_hits() {
+    std::stable_sort(hits_.begin(), hits_.end(),
+                     [](const Hit& a, const Hit& b) { return a.key < b.key; });
+    return std::move(hits_);
+  }
+
+ private:
+  CellMap cell(std::size_t leaf) const {
+    const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves_[leaf])];
+    return {&body_.lattice(), node.corner, 1 << node.size_log2,
+            corners_.empty() ? nullptr : corners_.data() + 8 * leaf};
+  }
+
+  std::vector<Box3> leaf_boxes() const {
+    std::vector<Box3> boxes(leaves_.size());
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      const CellMap c = cell(i);
+      boxes[i] = box_of(c, {0, 0, 0}, c.side);
+    }
+    return boxes;
+  }
+
+  /// Queries the tree along a part of the triangle; parts are halved until their boxes are tight.
+  void search(const std::array<Vec3d, 3>& part) {
+    Box3 box;
+    for (const Vec3d& p : part) box.add(p);
+    inflate(box, margin_);
+    if (!box.overlaps(tree_.bounds())) return;
+    std::size_t longest = 0;  // edge i is opposite to point i
+    double length = -1;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double l = largest(part[(i + 1) % 3] - part[(i + 2) % 3]);
+      if (l > length) {
+        length = l;
+        longest = i;
+      }
+    }
+    if (length <= reach_) {
+      tree_.query(box, [this](std::int32_t leaf) { test_leaf(static_cast<std::size_t>(leaf)); });
+      return;
+    }
+    const Vec3d &a = part[(longest + 1) % 3], &b = part[(longest + 2) % 3];
+    const Vec3d middle = 0.5 * a + 0.5 * b;
+    search({part[longest], a, middle});
+    search({part[longest], middle, b});
+  }
+
+  void test_leaf(std::size_t leaf) {
+    if (tested_[leaf] == number_) return;
+    tested_[leaf] = number_;
+    const CellMap c = cell(leaf);
+    test_cube(c, {0, 0, 0}, c.side);
+  }
+
+  /// Tests the finest cells in a cube of a leaf, given from the leaf's low corner.
+  void test_cube(const CellMap& cell, const Vec3i& low, std::int32_t size) {
+    const Box3 box = box_of(cell, low, size);
+    if (!box.overlaps(blade_.box) || !blade_.near_plane(box)) return;
+    if (size == 1) {
+      test_finest(cell, low);
+      return;
+    }
+    const std::int32_t half = size / 2;
+    for (int i = 0; i < 8; ++i)
+      test_cube(cell, {low[0] + (i & 1) * half, low[1] + (i >> 1 & 1) * half,
+                       low[2] + (i >> 2) * half},
+                half);
+  }
+
+  /// Tests the six half links of finest cell `v` of a leaf.
+  void test_finest(const CellMap& cell, const Vec3i& v) {
+    const Lattice& lattice = body_.lattice();
+    const Vec3i c{cell.corner[0] + v[0], cell.corner[1] + v[1], cell.corner[2] + v[2]};
+    const Vec3i center{2 * v[0] + 1, 2 * v[1] + 1, 2 * v[2] + 1};
+    const Int3 p = quantiser_(cell.position(center));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 2; ++side) {
+        Vec3i face = center, neighbour = c, lower = c;
+        face[axis] += 2 * side - 1;
+        neighbour[axis] += 2 * side - 1;
+        lower[axis] += side - 1;
+        double t = 0;
+        if (segment_crosses_triangle(p, quantiser_(cell.position(face)), blade_.points[0],
+                                     blade_.points[1], blade_.points[2], &t) == 0 ||
+            body_.leaf_at(neighbour) < 0)
+          continue;
+        hits_.push_back({lattice.link_key(lower, static_cast<int>(axis)), 1 - side, t,
+                         reference_normal(cell, center)});
+      }
+  }
+
+  Vec3f reference_normal(const CellMap& cell, const Vec3i& center) const {
+    Vec3d n = cell.pull_back(center, blade_.normal);
+    const double size = largest(n);
+    n = size > 0 && std::isfinite(size) ? (1 / size) * n : blade_.normal;
+    n = (1 / norm(n)) * n;
+    return {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)};
+  }
+
+  const LinkedOctree& body_;
+  std::span<const Vec3d> corners_;
+  std::vector<std::int32_t> leaves_;
+  Bvh tree_;
+  Quantiser quantiser_;
+  std::vector<std::int32_t> tested_;  // per leaf: the last triangle that it was tested against
+  double reach_ = 0, margin_ = 0;     // m
+  BladeTriangle blade_;               // the triangle at hand
+  std::int32_t number_ = 0;
+  std::vector<Hit> hits_;
+};
+
+/// The box of the body as it lies. @throws Error if a position is not finite.
+Box3 bounds_of(const LinkedOctree& body, std::span<const Vec3d> corners) {
+  Box3 box;
+  if (corners.empty()) {
+    box.add(body.lattice().point({0, 0, 0}));
+    box.add(body.lattice().point(body.lattice().size));
+  }
+  for (const Vec3d& p : corners) {
+    expects(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z),
+            "the deformed positions of the body are not finite: the simulation has diverged");
+    box.add(p);
+  }
+  return box;
+}
+
+Box3 bounds_of(const TriangleMesh& blade) {
+  Box3 box;
+  for (const auto& triangle : blade.triangles)
+    for (const std::int32_t p : triangle) box.add(blade.points[static_cast<std::size_t>(p)]);
+  return box;
+}
+
+/// Each end keeps the nearest of the crossings of one link.
+LinkCut nearest(std::span<const Hit> hits, double spacing, std::int32_t cut_id) {
+  LinkCut cut;
+  double best[2] = {std::numeric_limits<double>::infinity(),
+                    std::numeric_limits<double>::infinity()};
+  for (const Hit& hit : hits) {
+    const double near = 0.5 * spacing * hit.t;
+    for (int end = 0; end < 2; ++end) {
+      const double distance = end == hit.end ? near : spacing - near;
+      if (!(distance < best[end])) continue;
+      best[end] = distance;
+      cut.end[end] = {static_cast<float>(distance), hit.normal, cut_id};
+    }
+  }
+  return cut;
+}
+
+}  // namespace
+
+CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
+             std::int32_t cut_id) {
+  expects(cut_id > 0, "a blade needs a cut id of at least 1; 0 is the body's own surface");
+  expects(corners.empty() || corners.size() == 8 * body.leaf_count(),
+          "the deformed positions must number eight for each leaf of the body");
+  check_finite(blade, "the blade");
+  CutEvent event;
+  event.cut_id = cut_id;
+  event.cells_before = event.cells_after = body.leaf_count();
+  if (blade.triangles.empty()) return event;
+
+  const Box3 body_box = bounds_of(body, corners), blade_box = bounds_of(blade);
+  const double body_size = largest(body_box.extent()), blade_size = largest(blade_box.extent());
+  expects(blade_size <= kMaxBladeRatio * body_size,
+          text("the blade is ", blade_size, " m large and the body ", body_size,
+               " m: check the units of the blade"));
+  if (!body_box.overlaps(blade_box)) return event;
+
+  LinkSearch search(body, corners, body_box, blade_box);
+  for (const auto& t : blade.triangles)
+    search.add({blade.points[static_cast<std::size_t>(t[0])],
+                blade.points[static_cast<std::size_t>(t[1])],
+                blade.points[static_cast<std::size_t>(t[2])]});
+  const std::vector<Hit> hits = search.take_hits();
+
+  // From here on the body changes, and nothing in the input can be wrong any more.
+  const Lattice lattice = body.lattice();
+  for (std::size_t begin = 0, end = 0; begin < hits.size(); begin = end) {
+    const LinkKey key = hits[begin].key;
+    while (end < hits.size() && hits[end].key == key) ++end;
+    const LinkCut record =
+        nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id);
+    ++event.links_hit;
+    if (body.disconnect(lattice.link_lower(key), Lattice::link_axis(key), record))
+      event.disconnected.push_back(key);
+  }
+  event.cells_after = body.leaf_count();
+  return event;
+}
+
+}  // namespace kerf
