@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include "app/results.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/version.hpp"
+#include "core/base/error.hpp"
+
+namespace kerf {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSummary = "summary.json";
+constexpr const char* kPartial = ".partial";
+
+std::string partial_name(const std::string& name) { return "." + name + kPartial; }
+
+/// body_NNNN.vtu with four digits or more.
+bool is_body_file(const std::string& name) {
+  if (!name.starts_with("body_") || !name.ends_with(".vtu")) return false;
+  const std::string digits = name.substr(5, name.size() - 9);
+  return digits.size() >= 4 && std::all_of(digits.begin(), digits.end(),
+                                           [](char c) { return c >= '0' && c <= '9'; });
+}
+
+bool is_ours(const std::string& name) {
+  return is_body_file(name) || name == "body.pvd" || name == "preview.png" || name == kSummary;
+}
+
+/// A temporary file of a run that was killed.
+bool is_our_partial(const std::string& name) {
+  if (!name.starts_with('.') || !name.ends_with(kPartial)) return false;
+  return is_ours(name.substr(1, name.size() - 1 - std::strlen(kPartial)));
+}
+
+Error cannot_write(const fs::path& path, const std::string& why) {
+  return Error(ErrorKind::bad_input, text(path.string(), ": cannot be written: ", why));
+}
+
+Json step_json(const StepReport& step) {
+  Json json;
+  json["step"] = step.step;
+  json["time"] = step.time;
+  json["rotation_updates"] = step.rotation_updates;
+  json["cycles"] = step.cycles;
+  json["linear_residual"] = step.linear_residual;
+  json["residual"] = step.residual;
+  json["converged"] = step.converged;
+  json["seconds"] = step.seconds;
+  json["cells"] = step.cells;
+  json["vertices"] = step.vertices;
+  json["pieces"] = step.pieces;
+  json["cuts"] = Json::array();
+  for (const auto& cut : step.cuts)
+    json["cuts"].push_back({{"cut", cut.cut_id},
+                            {"links_hit", cut.links_hit},
+                            {"links_cut", cut.disconnected.size()},
+                            {"cells_before", cut.cells_before},
+                            {"cells_after", cut.cells_after}});
+  return json;
+}
+
+}  // namespace
+
+std::string to_json(const Summary& s) {
+  Json json;
+  json["scene"] = s.scene;
+  json["title"] = s.title;
+  json["cells"] = s.cells;
+  json["cells_before_cuts"] = s.cells_before_cuts;
+  json["vertices"] = s.vertices;
+  json["unknowns"] = s.unknowns;
+  json["hanging"] = s.hanging;
+  json["levels"] = s.level_cells.size();
+  json["level_cells"] = s.level_cells;
+  json["level_vertices"] = s.level_vertices;
+  json["pieces"] = s.pieces;
+  json["links_cut"] = s.links_cut;
+  json["converged"] = s.converged;
+  json["interrupted"] = s.interrupted;
+  json["seconds"] = Json::object();
+  for (const auto& [phase, seconds] : s.seconds) json["seconds"][phase] = seconds;
+  json["seconds"]["total"] = s.seconds_total;
+  json["peak_bytes"] = s.peak_bytes;
+  json["bytes_per_cell"] =
+      s.cells > 0 ? static_cast<double>(s.bytes) / static_cast<double>(s.cells) : 0.0;
+  json["backend"] = s.backend;
+  json["threads"] = s.threads;
+  json["precision"] = s.precision;
+  json["version"] = kVersion;
+  json["commit"] = kCommit;
+  json["state_hash"] = fmt::format("{:016x}", s.state_hash);
+  json["warnings"] = s.warnings;
+  json["steps"] = Json::array();
+  for (const auto& step : s.steps) json["steps"].push_back(step_json(step));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+ResultsFolder::ResultsFolder(fs::path folder, OutputSettings settings)
+    : folder_(std::move(folder)), settings_(settings) {
+  std::error_code error;
+  const fs::file_status status = fs::status(folder_, error);
+  if (fs::exists(status) && !fs::is_directory(status))
+    throw cannot_write(folder_, "it is a file, not a folder");
+  // Remember which folders are new, innermost first, to take them back if the run fails.
+  for (fs::path p = fs::absolute(folder_).lexically_normal(); !p.empty() && p != p.root_path();
+       p = p.parent_path())
+    if (!p.filename().empty() && !fs::exists(p, error)) created_.push_back(p);
+  fs::create_directories(folder_, error);
+  if (error) {
+    const std::string why = error.message();
+    for (const auto& p : created_) fs::remove(p, error);
+    throw cannot_write(folder_, why);
+  }
+  const fs::path probe = folder_ / partial_name(kSummary);
+  std::ofstream out(probe);
+  const int reason = errno;
+  out.close();
+  if (!out) {
+    for (const auto& p : created_) fs::remove(p, error);
+    throw cannot_write(folder_, std::strerror(reason));
+  }
+  fs::remove(probe, error);
+}
+
+ResultsFolder::~ResultsFolder() {
+  if (committed_) return;
+  std::error_code error;
+  for (const auto& name : files_) fs::remove(folder_ / partial_name(name), error);
+  fs::remove(folder_ / partial_name(kSummary), error);
+  for (const auto& p : created_) fs::remove(p, error);  // fails, as it should, if not empty
+}
+
+fs::path ResultsFolder::add_file(const std::string& name) {
+  files_.push_back(name);
+  return folder_ / partial_name(name);
+}
+
+void ResultsFolder::drop_file(const std::string& name) {
+  std::error_code error;
+  fs::remove(folder_ / partial_name(name), error);
+  std::erase(files_, name);
+}
+
+void ResultsFolder::write_text(const std::string& name, const std::string& content) {
+  const fs::path path = folder_ / partial_name(name);
+  std::ofstream out(path, std::ios::binary);
+  out << content;
+  out.close();
+  if (!out) throw cannot_write(folder_ / name, std::strerror(errno));
+}
+
+void ResultsFolder::add_snapshot(int step, double time, const Snapshot& snapshot) {
+  if (!settings_.vtu) return;
+  const std::string name = fmt::format("body_{:04}.vtu", step);
+  const fs::path path = add_file(name);
+  write_vtu(path, snapshot);
+  series_.emplace_back(time, name);
+}
+
+void ResultsFolder::remove_stale() const {
+  std::error_code error;
+  std::vector<fs::path> stale;
+  for (const auto& entry : fs::directory_iterator(folder_, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool written = std::find(files_.begin(), files_.end(), name) != files_.end();
+    if ((is_ours(name) && !written && name != kSummary) || is_our_partial(name))
+      stale.push_back(entry.path());
+  }
+  for (const auto& path : stale) fs::remove(path, error);
+}
+
+void ResultsFolder::commit(const Summary& summary) {
+  if (settings_.pvd) {
+    std::string pvd =
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
+        "  <Collection>\n";
+    for (const auto& [time, name] : series_)
+      pvd += fmt::format("    <DataSet timestep=\"{:.9g}\" part=\"0\" file=\"{}\"/>\n", time, name);
+    pvd += "  </Collection>\n</VTKFile>\n";
+    add_file("body.pvd");
+    write_text("body.pvd", pvd);
+  }
+  write_text(kSummary, to_json(summary));
+
+  // The old summary goes first and the new one comes last: a summary means that all is there.
+  std::error_code error;
+  fs::remove(folder_ / kSummary, error);
+  for (const auto& name : files_) {
+    fs::rename(folder_ / partial_name(name), folder_ / name, error);
+    if (error) throw cannot_write(folder_ / name, error.message());
+  }
+  fs::rename(folder_ / partial_name(kSummary), folder_ / kSummary, error);
+  if (error) throw cannot_write(folder_ / kSummary, error.message());
+  committed_ = true;
+  remove_stale();
+}
+
+}  // namespace kerf

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+//
+// What a run leaves behind: a folder that is either finished or untouched. docs/results.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/scene.hpp"
+#include "core/simulation.hpp"
+
+namespace kerf {
+
+/// The content of summary.json.
+struct Summary {
+  std::string scene, title;
+  std::size_t cells = 0, cells_before_cuts = 0, vertices = 0, unknowns = 0, hanging = 0;
+  std::size_t pieces = 0, links_cut = 0;
+  std::vector<std::size_t> level_cells, level_vertices;  ///< finest first
+  PhaseTimes seconds;
+  double seconds_total = 0;
+  std::vector<StepReport> steps;
+  std::size_t peak_bytes = 0;  ///< of the process
+  std::size_t bytes = 0;       ///< held by body, hierarchy and backend
+  std::string backend, precision;
+  int threads = 0;
+  std::uint64_t state_hash = 0;
+  bool converged = true, interrupted = false;
+  std::vector<std::string> warnings;
+};
+
+/// JSON text; numbers that are not finite become null.
+std::string to_json(const Summary& summary);
+
+/// Writes `snapshot` as a VTK unstructured grid: XML, raw appended data, little endian.
+/// @throws Error (bad_input) if the file cannot be written.
+void write_vtu(const std::filesystem::path& file, const Snapshot& snapshot);
+
+/// Files are written under temporary names (".NAME.partial") and get their own when `commit` is
+/// called, the summary last; without a commit, nothing remains. Files that an earlier run of kerf
+/// left are replaced or removed then; others are not touched.
+class ResultsFolder {
+ public:
+  /// Creates the folder if it is absent.
+  /// @throws Error (bad_input) if it is a file or cannot be written.
+  ResultsFolder(std::filesystem::path folder, OutputSettings settings);
+  ~ResultsFolder();
+  ResultsFolder(const ResultsFolder&) = delete;
+  ResultsFolder& operator=(const ResultsFolder&) = delete;
+
+  void add_snapshot(int step, double time, const Snapshot& snapshot);
+  /// A temporary path for one more file; it must exist when `commit` is called.
+  std::filesystem::path add_file(const std::string& name);
+  void drop_file(const std::string& name);  ///< takes it back, written or not
+  void commit(const Summary& summary);
+
+  const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  void write_text(const std::string& name, const std::string& content);
+  void remove_stale() const;
+
+  std::filesystem::path folder_;
+  OutputSettings settings_;
+  bool committed_ = false;
+  std::vector<std::filesystem::path> created_;           // folders that were not there before
+  std::vector<std::string> files_;                       // names, written as partial so far
+  std::vector<std::pair<double, std::string>> series_;   // time and body file
+};
+
+}  // namespace kerf

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: MIT
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "app/backends.hpp"
+#include "app/commands.hpp"
+#include "app/preview.hpp"
+#include "app/progress.hpp"
+#include "app/results.hpp"
+#include "app/session.hpp"
+#include "core/base/error.hpp"
+
+namespace kerf {
+namespace {
+
+volatile std::sig_atomic_t interrupt_asked = 0;
+
+/// While it lives, an interrupt asks the run to stop after the step; a second one ends it at once.
+class InterruptGuard {
+ public:
+  InterruptGuard() {
+    interrupt_asked = 0;
+    struct sigaction action {};
+    action.sa_handler = [](int) { interrupt_asked = 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    sigaction(SIGINT, &action, &before_);
+  }
+  ~InterruptGuard() { sigaction(SIGINT, &before_, nullptr); }
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+  static bool asked() { return interrupt_asked != 0; }
+
+ private:
+  struct sigaction before_ {};
+};
+
+std::size_t peak_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+}
+
+Vec3d up_direction(const SimulationSetup& setup) {
+  for (const auto& load : setup.loads)
+    if (const auto* gravity = std::get_if<Gravity>(&load))
+      if (norm(gravity->acceleration) > 0) return -gravity->acceleration;
+  return {0, 1, 0};
+}
+
+Box3 deformed_box(const Snapshot& s) {
+  Box3 box;
+  for (std::size_t i = 0; i < s.points.size(); ++i) box.add(s.points[i] + s.displacement[i]);
+  return box;
+}
+
+/// One run, from its first step to its files.
+class Run {
+ public:
+  Run(const Scene& scene, const RunOptions& options, Simulation& simulation, ResultsFolder& results)
+      : scene_(scene), options_(options), simulation_(simulation), results_(results),
+        bar_(!options.quiet), hits_(scene.setup.cuts.size(), 0) {}
+
+  int execute() {
+    begin_ = std::chrono::steady_clock::now();
+    say_body();
+    say_warnings();
+    results_.add_snapshot(0, simulation_.time(), simulation_.snapshot());
+    step_through();
+    if (last_written_ != simulation_steps() || snapshot_.cells.empty()) write_snapshot();
+    draw();
+    finish_summary();
+    results_.commit(summary_);
+    say_end();
+    return status();
+  }
+
+ private:
+  int simulation_steps() const { return summary_.steps.empty() ? 0 : summary_.steps.back().step; }
+
+  void say(const std::string& line) {
+    if (options_.quiet) return;
+    bar_.clear();
+    std::printf("%s\n", line.c_str());
+    std::fflush(stdout);
+  }
+
+  void complain(const std::string& line) {
+    bar_.clear();
+    std::fprintf(stderr, "kerf: %s\n", line.c_str());
+  }
+
+  void say_body() {
+    const auto& s = simulation_;
+    say(fmt::format("{} cells, {} vertices, {} levels, {}, backend {} with {} {}{}", s.cells(),
+                    s.vertices(), s.hierarchy().levels.size(), bytes_text(s.bytes()),
+                    s.backend().name(), s.backend().threads(),
+                    s.backend().threads() == 1 ? "thread" : "threads",
+                    scene_.setup.solver.backend == "auto" ? " (chosen by auto)" : ""));
+  }
+
+  void say_warnings() {
+    const auto& all = simulation_.warnings();
+    for (; warnings_said_ < all.size(); ++warnings_said_)
+      complain("warning: " + all[warnings_said_]);
+  }
+
+  void step_through() {
+    const InterruptGuard guard;
+    simulation_.on_progress([this](const char* phase, int cycles, double residual) {
+      bar_.phase(phase, cycles, residual);
+    });
+    bar_.start(simulation_.steps_planned());
+    while (!simulation_.finished() && !InterruptGuard::asked()) {
+      const StepReport step = simulation_.step();
+      summary_.steps.push_back(step);
+      note(step);
+      bar_.finished(step);
+      if (step.step % scene_.output.every == 0) write_snapshot();
+      if (!std::isfinite(step.residual)) {
+        diverged_ = true;
+        break;
+      }
+    }
+    summary_.interrupted = InterruptGuard::asked() && !simulation_.finished();
+    simulation_.on_progress({});
+    bar_.clear();
+  }
+
+  void note(const StepReport& step) {
+    for (const auto& cut : step.cuts)
+      if (cut.cut_id >= 1 && static_cast<std::size_t>(cut.cut_id) <= hits_.size())
+        hits_[static_cast<std::size_t>(cut.cut_id - 1)] += cut.links_hit;
+    if (step.pieces != step.pieces_before)
+      say(fmt::format("t = {:.4g} s: {} pieces (was {})", step.time, step.pieces,
+                      step.pieces_before));
+    if (!step.converged) {
+      summary_.converged = false;
+      if (not_converged_++ == 0) first_not_converged_ = step;
+    }
+    say_warnings();
+  }
+
+  void write_snapshot() {
+    snapshot_ = simulation_.snapshot();
+    last_written_ = simulation_steps();
+    if (last_written_ > 0) results_.add_snapshot(last_written_, simulation_.time(), snapshot_);
+  }
+
+  void draw() {
+    if (!scene_.output.preview) return;
+    try {
+      if (diverged_) throw Error(ErrorKind::unavailable, "the positions are not finite");
+      draw_preview(results_.add_file("preview.png"), snapshot_,
+                   {.up = up_direction(scene_.setup)});
+      drawn_ = true;
+    } catch (const Error& error) {  // a run is worth keeping without its picture
+      results_.drop_file("preview.png");
+      summary_.warnings.push_back(text("no preview.png: ", error.what()));
+      complain("warning: " + summary_.warnings.back());
+    }
+  }
+
+  void finish_summary() {
+    const auto& s = simulation_;
+    summary_.scene = scene_.file.string();
+    summary_.title = scene_.title;
+    summary_.cells = s.cells();
+    summary_.cells_before_cuts = s.cells_before_cuts();
+    summary_.vertices = s.vertices();
+    summary_.unknowns = s.unknowns();
+    summary_.hanging = s.hanging();
+    summary_.pieces = s.pieces();
+    summary_.links_cut = s.links_cut();
+    for (const auto& level : s.hierarchy().levels) {
+      summary_.level_cells.push_back(static_cast<std::size_t>(level.cells()));
+      summary_.level_vertices.push_back(static_cast<std::size_t>(level.vertices()));
+    }
+    summary_.seconds = s.seconds();
+    summary_.seconds_total =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    summary_.peak_bytes = peak_bytes();
+    summary_.bytes = s.bytes();
+    summary_.backend = s.backend().name();
+    summary_.threads = s.backend().threads();
+    summary_.precision = precision_name(scene_.setup.solver.precision);
+    summary_.state_hash = s.state_hash();
+    summary_.warnings.insert(summary_.warnings.begin(), s.warnings().begin(), s.warnings().end());
+    if (!summary_.interrupted && !diverged_)
+      missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
+    if (!missed_.empty()) summary_.warnings.push_back(missed_);
+  }
+
+  void say_end() {
+    if (drawn_) say(fmt::format("picture    {}", (results_.folder() / "preview.png").string()));
+    say(fmt::format("folder     {}", results_.folder().string()));
+    say(fmt::format("cells      {} ({} before cuts)", summary_.cells, summary_.cells_before_cuts));
+    say(fmt::format("steps      {}", summary_.steps.size()));
+    say(fmt::format("seconds    {:.1f}", summary_.seconds_total));
+    say(fmt::format("links cut  {}", summary_.links_cut));
+    say(fmt::format("pieces     {}", summary_.pieces));
+  }
+
+  int status() {
+    if (!missed_.empty()) complain("error: " + missed_);
+    if (not_converged_ > 0 || diverged_) {
+      const StepReport& step = not_converged_ > 0 ? first_not_converged_ : summary_.steps.back();
+      complain(fmt::format(
+          "error: not converged in {} of {} steps, first in step {}: linear residual {:.2e}, "
+          "residual {:.2e} after {} cycles; results are kept",
+          std::max(not_converged_, 1), summary_.steps.size(), step.step, step.linear_residual,
+          step.residual, step.cycles));
+    }
+    if (summary_.interrupted) {
+      complain(fmt::format("interrupted after step {} of {}; results so far are kept",
+                           summary_.steps.size(), simulation_.steps_planned()));
+      return kInterrupted;
+    }
+    if (!missed_.empty()) return kBadInput;
+    return not_converged_ > 0 || diverged_ ? kNotConverged : kDone;
+  }
+
+  const Scene& scene_;
+  const RunOptions& options_;
+  Simulation& simulation_;
+  ResultsFolder& results_;
+  ProgressBar bar_;
+  Summary summary_;
+  Snapshot snapshot_;              // of step last_written_
+  std::vector<std::size_t> hits_;  // links met, per cut
+  std::chrono::steady_clock::time_point begin_{};
+  std::string missed_;
+  std::size_t warnings_said_ = 0;
+  StepReport first_not_converged_;
+  int last_written_ = -1, not_converged_ = 0;
+  bool diverged_ = false, drawn_ = false;
+};
+
+}  // namespace
+
+int run_command(const RunOptions& options) {
+  const Scene scene = read_scene(options.scene, options.overrides);
+  auto backend = open_backend(scene);
+  ResultsFolder results(options.out, scene.output);
+  Simulation simulation = open_simulation(scene, std::move(backend));
+  return Run(scene, options, simulation, results).execute();
+}
+
+}  // namespace kerf
