@@ -65,9 +65,11 @@ void inflate(Box3& box, double by) {
   box.hi += {by, by, by};
 }
 
+/// Holds a cube of finest cells of a leaf: a trilinear map stays within its corners.
 Box3 box_of(const CellMap& cell, const Vec3i& low, std::int32_t size) {
   Box3 box;
-  for (int i = 0; i < 8; ++i)
+  const int step = cell.corners == nullptr ? 7 : 1;  // of an undeformed cube two corners tell
+  for (int i = 0; i < 8; i += step)
     box.add(cell.position({2 * (low[0] + (i & 1) * size), 2 * (low[1] + (i >> 1 & 1) * size),
                            2 * (low[2] + (i >> 2) * size)}));
   return box;
@@ -93,17 +95,16 @@ class LinkSearch {
              const Box3& blade_box)
       : body_(body),
         corners_(corners),
-        leaves_(body.leaves()),
-        tree_(leaf_boxes()),
         quantiser_(quantiser_box(body_box, blade_box)),
-        tested_(leaves_.size(), -1) {
-    const Lattice& lattice = body.lattice();
-    // Small query boxes along a slanted triangle, but not too many if the body has grown.
-    reach_ = std::max(4 * lattice.spacing, largest(body_box.extent()) / 256);
-    const double coordinate = std::max({largest(body_box.lo), largest(body_box.hi),
-                                        largest(blade_box.lo), largest(blade_box.hi)});
-    margin_ = 4 * quantiser_.unit() + 32 * std::numeric_limits<double>::epsilon() * coordinate;
-  }
+        // Small query boxes along a slanted triangle, but not too many if the body has grown.
+        reach_(std::max(4 * body.lattice().spacing, largest(body_box.extent()) / 256)),
+        margin_(4 * quantiser_.unit() +
+                32 * std::numeric_limits<double>::epsilon() *
+                    std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box.lo),
+                              largest(blade_box.hi)})),
+        near_(leaves_near(blade_box)),
+        tree_(boxes_),
+        tested_(near_.size(), -1) {}
 
   /// Adds the crossings with one triangle.
   void add(const std::array<Vec3d, 3>& triangle) {
@@ -127,19 +128,21 @@ class LinkSearch {
   }
 
  private:
-  CellMap cell(std::size_t leaf) const {
-    const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves_[leaf])];
-    return {&body_.lattice(), node.corner, 1 << node.size_log2,
-            corners_.empty() ? nullptr : corners_.data() + 8 * leaf};
-  }
-
-  std::vector<Box3> leaf_boxes() const {
-    std::vector<Box3> boxes(leaves_.size());
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-      const CellMap c = cell(i);
-      boxes[i] = box_of(c, {0, 0, 0}, c.side);
+  /// The leaves whose boxes the blade's box meets; their boxes go to boxes_.
+  std::vector<CellMap> leaves_near(Box3 blade_box) {
+    inflate(blade_box, margin_);
+    const std::vector<std::int32_t> leaves = body_.leaves();
+    std::vector<CellMap> near;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves[i])];
+      const CellMap cell{&body_.lattice(), node.corner, 1 << node.size_log2,
+                         corners_.empty() ? nullptr : corners_.data() + 8 * i};
+      const Box3 box = box_of(cell, {0, 0, 0}, cell.side);
+      if (!box.overlaps(blade_box)) continue;
+      near.push_back(cell);
+      boxes_.push_back(box);
     }
-    return boxes;
+    return near;
   }
 
   /// Queries the tree along a part of the triangle; parts are halved until their boxes are tight.
@@ -170,23 +173,22 @@ class LinkSearch {
   void test_leaf(std::size_t leaf) {
     if (tested_[leaf] == number_) return;
     tested_[leaf] = number_;
-    const CellMap c = cell(leaf);
-    test_cube(c, {0, 0, 0}, c.side);
+    test_cube(near_[leaf], {0, 0, 0}, near_[leaf].side, boxes_[leaf]);
   }
 
-  /// Tests the finest cells in a cube of a leaf, given from the leaf's low corner.
-  void test_cube(const CellMap& cell, const Vec3i& low, std::int32_t size) {
-    const Box3 box = box_of(cell, low, size);
+  /// Tests the finest cells in a cube of a leaf; `low` counts from the leaf's low corner.
+  void test_cube(const CellMap& cell, const Vec3i& low, std::int32_t size, const Box3& box) {
     if (!box.overlaps(blade_.box) || !blade_.near_plane(box)) return;
     if (size == 1) {
       test_finest(cell, low);
       return;
     }
     const std::int32_t half = size / 2;
-    for (int i = 0; i < 8; ++i)
-      test_cube(cell, {low[0] + (i & 1) * half, low[1] + (i >> 1 & 1) * half,
-                       low[2] + (i >> 2) * half},
-                half);
+    for (int i = 0; i < 8; ++i) {
+      const Vec3i part{low[0] + (i & 1) * half, low[1] + (i >> 1 & 1) * half,
+                       low[2] + (i >> 2) * half};
+      test_cube(cell, part, half, box_of(cell, part, half));
+    }
   }
 
   /// Tests the six half links of finest cell `v` of a leaf.
@@ -221,11 +223,13 @@ class LinkSearch {
 
   const LinkedOctree& body_;
   std::span<const Vec3d> corners_;
-  std::vector<std::int32_t> leaves_;
-  Bvh tree_;
   Quantiser quantiser_;
-  std::vector<std::int32_t> tested_;  // per leaf: the last triangle that it was tested against
-  double reach_ = 0, margin_ = 0;     // m
+  double reach_;    // of the parts of a triangle that are searched at a time, m
+  double margin_;   // covers the rounding of every box, m
+  std::vector<Box3> boxes_;           // of the leaves near the blade
+  std::vector<CellMap> near_;
+  Bvh tree_;
+  std::vector<std::int32_t> tested_;  // per near leaf: the last triangle it was tested against
   BladeTriangle blade_;               // the triangle at hand
   std::int32_t number_ = 0;
   std::vector<Hit> hits_;
