@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "core/backend.hpp"
+#include "core/base/error.hpp"
 #include "core/body/cut.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/levels/hierarchy.hpp"

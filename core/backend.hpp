@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+//
+// What the cycle in core/solve/ may ask of a machine. Level 0 is the finest.
+//
+// A backend owns the values of one simulation: rotations, matrices, and named vectors on every
+// level. A vector has three components per vertex; on the host it is x0 y0 z0 x1 y1 z1 ...
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/levels/hierarchy.hpp"
+
+namespace kerf {
+
+/// Vectors that every level has. Level 0 has more: `Backend::add_vector`.
+enum VectorId : int {
+  kSolution,    ///< u of A u = f
+  kRight,       ///< f
+  kResidual,    ///< f - A u
+  kDirection,   ///< of the Chebyshev recursion
+  kScratch,     ///< product of the Chebyshev recursion and of the Krylov methods
+  kKrylovX,     ///< two vectors of the K-cycle, and conjugate gradients on level 0
+  kKrylovV,
+  kLevelVectors
+};
+
+enum class SweepOrder { forward, backward };
+
+/// A = stiffness * [R] K [R]^T + mass * M, summed over the cells.
+struct OperatorScale {
+  double stiffness = 1;
+  double mass = 0;
+};
+
+struct SmootherOptions {
+  bool chebyshev = true;
+  double omega = 1.0;          ///< Gauss-Seidel
+  int degree = 2;              ///< Chebyshev steps in one sweep
+  double smallest = 1.0 / 8;   ///< Chebyshev: lower end of the range, relative to the upper
+};
+
+/// Holds one simulation's matrices and vectors and runs the loops over them.
+/// Not thread-safe. A call may return early; the next call on the same object sees its result.
+/// Fixed components take no part: operators read them as zero and leave zero in them.
+/// @throws Error from any call if memory or the device fails; the object is then unusable.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  virtual const char* name() const noexcept = 0;  ///< "cpu" or "cuda"
+  virtual int threads() const noexcept = 0;
+  virtual std::size_t bytes() const = 0;
+
+  // Structure.
+  /// Topology; again after each cut. Vectors and rotations are then zero and identity.
+  /// The hierarchy must outlive the next load.
+  virtual void load(const Hierarchy& hierarchy) = 0;
+  virtual void set_smoother(const SmootherOptions& options) = 0;
+  /// One more vector on level 0; stays through later loads.
+  virtual int add_vector() = 0;
+
+  // Values.
+  virtual void set_operator(const OperatorScale& scale) = 0;
+  /// Level 0: R of every cell from the displacements, warm-started from the last R.
+  virtual void rotate_cells(int displacement) = 0;
+  /// R of every cell of level 0 as a unit quaternion, four doubles a cell: w x y z.
+  virtual void read_rotations(std::span<double> out) const = 0;
+  virtual void write_rotations(std::span<const double> in) = 0;
+  virtual void coarsen(int fine) = 0;     ///< matrices of fine + 1 from fine
+  virtual void prepare(int level) = 0;    ///< diagonal blocks, and the bound for Chebyshev
+  virtual void factor_coarsest() = 0;     ///< throws Error (bad_input) if a piece is not held
+  /// Lower triangle of the matrix of a cell over its slots, 300 doubles (kernels/layout.hpp).
+  virtual void read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const = 0;
+  /// Upper end of the smoother's range: an estimate from above of max eig(D^-1 A).
+  virtual double spectral_bound(int level) const = 0;
+
+  // The cycle.
+  virtual void smooth(int level, SweepOrder order, int count) = 0;  ///< u from f
+  virtual double residual(int level) = 0;            ///< r = f - A u; returns |r|
+  virtual void restrict_residual(int fine) = 0;      ///< f of fine + 1 = P^T r; its u = 0
+  virtual void prolong_correction(int fine) = 0;     ///< u of fine += P u of fine + 1
+  virtual void solve_coarsest() = 0;                 ///< u from f
+  virtual void apply(int level, int in, int out) = 0;             ///< out = A in
+  virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
+
+  // Forces, level 0.
+  /// out = sum over cells of [R] K ([R]^T (x + u) - x); held components too (reactions).
+  virtual void elastic_force(int displacement, int out) = 0;
+  /// out = (scale.stiffness [R] K [R]^T + scale.mass M) in; held components too.
+  virtual void apply_scaled(const OperatorScale& scale, int in, int out) = 0;
+
+  // Vectors.
+  virtual void zero(int level, int x) = 0;
+  virtual void copy(int level, int from, int to) = 0;
+  virtual void add(int level, double a, int x, int y) = 0;               ///< y += a x
+  virtual void combine(int level, double a, int x, double b, int y) = 0;  ///< y = a x + b y
+  virtual double dot(int level, int x, int y) = 0;
+  virtual void mask(int level, int x) = 0;  ///< zero in fixed components
+  virtual void write(int level, int x, std::span<const double> values) = 0;
+  virtual void read(int level, int x, std::span<double> values) const = 0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#include "core/fem/equilibrium.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kerf {
+namespace {
+
+constexpr int kDepth = 6;  // measured in docs/convergence.md; 3 to 10 behave alike
+
+}  // namespace
+
+Equilibrium::Equilibrium(Backend& backend, LinearSolver& solver, const TimeSetup& time,
+                         const SolverSetup& setup, StateVectors state)
+    : backend_(backend),
+      solver_(solver),
+      time_(time),
+      setup_(setup),
+      state_(state),
+      right_(backend.add_vector()),
+      increment_(backend.add_vector()),
+      best_(backend.add_vector()),
+      previous_u_(backend.add_vector()),
+      previous_d_(backend.add_vector()) {
+  for (int i = 0; i < 2 * kDepth; ++i) free_.push_back(backend_.add_vector());
+}
+
+double Equilibrium::residual() {
+  if (!keep_rotations_) backend_.rotate_cells(state_.displacement);
+  backend_.elastic_force(state_.displacement, right_);
+  const double inner = backend_.dot(0, right_, right_);  // with the reactions
+  const double outer = backend_.dot(0, state_.external, state_.external);
+  backend_.combine(0, 1, state_.external, -1, right_);
+  backend_.mask(0, right_);
+  const double reference = std::sqrt(std::max(inner, outer));
+  if (reference == 0) return 0;
+  return std::sqrt(backend_.dot(0, right_, right_)) / reference;
+}
+
+// Solves for the increment of the current iterate; the force is in right_ already.
+double Equilibrium::update(double mass_factor) {
+  // The rotations move as well, so that digits beyond the next two or three are wasted.
+  constexpr double kInner = 1e-3;
+  backend_.set_operator({1, mass_factor});
+  solver_.refresh();
+  backend_.zero(0, increment_);
+  const SolveStats solve =
+      solver_.solve(right_, increment_, std::max(setup_.tolerance, kInner));
+  stats_.cycles += solve.cycles;
+  stats_.linear_residual = std::max(stats_.linear_residual, solve.residual);
+  ++stats_.rotation_updates;
+  keep_rotations_ = false;
+  return solve.residual;
+}
+
+// u <- u + d - sum gamma_j (du_j + dd_j), gamma least squares of d - sum gamma_j dd_j.
+void Equilibrium::anderson_step(int depth) {
+  if (depth > 0) {
+    if (static_cast<int>(du_.size()) == kDepth) {
+      free_.push_back(du_.front());
+      free_.push_back(dd_.front());
+      du_.erase(du_.begin());
+      dd_.erase(dd_.begin());
+    }
+    du_.push_back(free_.back());
+    free_.pop_back();
+    dd_.push_back(free_.back());
+    free_.pop_back();
+    backend_.copy(0, state_.displacement, du_.back());
+    backend_.add(0, -1, previous_u_, du_.back());
+    backend_.copy(0, increment_, dd_.back());
+    backend_.add(0, -1, previous_d_, dd_.back());
+  }
+  backend_.copy(0, state_.displacement, previous_u_);
+  backend_.copy(0, increment_, previous_d_);
+
+  const int m = static_cast<int>(dd_.size());
+  backend_.add(0, 1, increment_, state_.displacement);
+  if (m == 0) return;
+  Eigen::MatrixXd gram(m, m);
+  Eigen::VectorXd right(m), scale(m);
+  for (int i = 0; i < m; ++i) {
+    for (int j = 0; j <= i; ++j) gram(i, j) = gram(j, i) = backend_.dot(0, dd_[i], dd_[j]);
+    right(i) = backend_.dot(0, dd_[i], increment_);
+    scale(i) = gram(i, i) > 0 ? 1 / std::sqrt(gram(i, i)) : 0;
+  }
+  // Scaled to a unit diagonal, so that the rank decision sees directions and not lengths.
+  gram = scale.asDiagonal() * gram * scale.asDiagonal();
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
+  solver.setThreshold(1e-12);
+  solver.compute(gram);
+  const Eigen::VectorXd gamma =
+      scale.asDiagonal() * solver.solve(scale.asDiagonal() * right).eval();
+  for (int i = 0; i < m; ++i) {
+    backend_.add(0, -gamma(i), du_[i], state_.displacement);
+    backend_.add(0, -gamma(i), dd_[i], state_.displacement);
+  }
+}
+
+// Steps with a mass term and the velocity thrown away; returns whether Anderson may go on.
+bool Equilibrium::pseudo_time(double natural_time) {
+  constexpr int kSteps = 30;
+  constexpr double kNear = 0.05;  // of the residual at entry
+  double dt = 0.25 * natural_time, last = stats_.residual;
+  const double entry = last;
+  for (int i = 0; i < kSteps && stats_.rotation_updates < time_.nonlinear_iterations; ++i) {
+    update(1 / (dt * dt));
+    backend_.add(0, 1, increment_, state_.displacement);
+    stats_.residual = residual();
+    if (progress_) progress_(stats_.rotation_updates, stats_.residual);
+    if (!std::isfinite(stats_.residual)) return false;
+    if (finished() || stats_.residual < kNear * entry) return true;
+    dt *= stats_.residual < last ? 1.3 : 0.5;
+    last = stats_.residual;
+  }
+  return true;
+}
+
+NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
+  stats_ = {};
+  keep_rotations_ = keep_rotations;
+  const auto forget = [&] {
+    for (auto* list : {&du_, &dd_}) {
+      free_.insert(free_.end(), list->begin(), list->end());
+      list->clear();
+    }
+  };
+  forget();
+  stats_.residual = residual();
+  double best = std::numeric_limits<double>::infinity();
+  int since_best = 0, depth = 0;
+  while (!(finished() && !keep_rotations_) &&
+         stats_.rotation_updates < time_.nonlinear_iterations) {
+    update(0);
+    anderson_step(depth++);
+    stats_.residual = residual();
+    if (progress_) progress_(stats_.rotation_updates, stats_.residual);
+    if (stats_.residual < best) {
+      // Only a real gain counts as progress.
+      since_best = stats_.residual < 0.9 * best ? 0 : since_best + 1;
+      best = stats_.residual;
+      backend_.copy(0, state_.displacement, best_);
+    } else {
+      ++since_best;
+    }
+    // Large loads: the first iterates may be far worse than the start without harm.
+    constexpr int kPatience = 15;
+    const bool lost = !std::isfinite(stats_.residual) || stats_.residual > 1e3 * best;
+    if (!lost && since_best < kPatience) continue;
+    backend_.copy(0, best_, state_.displacement);
+    stats_.residual = residual();
+    if (!pseudo_time(natural_time)) break;
+    forget();
+    depth = 0;
+    since_best = 0;
+    best = stats_.residual;
+    backend_.copy(0, state_.displacement, best_);
+  }
+  if (!(stats_.residual <= best)) {  // end on the best iterate, never on a NaN
+    backend_.copy(0, best_, state_.displacement);
+    stats_.residual = residual();
+  }
+  stats_.converged = finished();
+  return stats_;
+}
+
+}  // namespace kerf

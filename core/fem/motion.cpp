@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+#include "core/fem/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kerf {
+namespace {
+
+constexpr double kBeta = 0.25, kGamma = 0.5;  // Newmark: second order, no numerical damping
+
+}  // namespace
+
+Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
+               const Material& material, const SolverSetup& setup, StateVectors state)
+    : backend_(backend),
+      solver_(solver),
+      time_(time),
+      material_(material),
+      setup_(setup),
+      state_(state),
+      acceleration_(time.scheme == TimeScheme::newmark ? state.memory : backend.add_vector()),
+      right_(backend.add_vector()),
+      increment_(backend.add_vector()),
+      work_(backend.add_vector()) {}
+
+double Motion::velocity_factor() const {
+  return time_.scheme == TimeScheme::newmark ? kGamma / (kBeta * time_.step) : 0.5 / time_.step;
+}
+
+double Motion::acceleration_factor() const {
+  const double dt2 = time_.step * time_.step;
+  return time_.scheme == TimeScheme::newmark ? 1 / (kBeta * dt2) : 1 / dt2;
+}
+
+// Solves M a = external - elastic - damping for the start; M is well conditioned.
+void Motion::start() {
+  backend_.rotate_cells(state_.displacement);
+  backend_.zero(0, acceleration_);
+  residual(right_);
+  backend_.set_operator({0, 1});
+  backend_.prepare(0);
+  backend_.zero(0, increment_);
+  // A few steps of conjugate gradients with block Jacobi reach rounding: the condition is below 30.
+  constexpr int kSteps = 60;
+  const double goal = 1e-28 * backend_.dot(0, right_, right_);
+  double rho = 0;
+  for (int i = 0; i < kSteps && backend_.dot(0, right_, right_) > goal; ++i) {
+    backend_.precondition_jacobi(0, right_, kSolution);
+    const double next = backend_.dot(0, kSolution, right_);
+    backend_.combine(0, 1, kSolution, i == 0 ? 0 : next / rho, work_);
+    rho = next;
+    backend_.apply(0, work_, kScratch);
+    const double alpha = rho / backend_.dot(0, work_, kScratch);
+    backend_.add(0, alpha, work_, increment_);
+    backend_.add(0, -alpha, kScratch, right_);
+  }
+  if (time_.scheme == TimeScheme::newmark) {
+    backend_.copy(0, increment_, acceleration_);
+    return;
+  }
+  // u_{-1} = u_0 - dt v_0 + dt^2 / 2 a_0
+  backend_.copy(0, state_.displacement, state_.memory);
+  backend_.add(0, -time_.step, state_.velocity, state_.memory);
+  backend_.add(0, 0.5 * time_.step * time_.step, increment_, state_.memory);
+}
+
+// Velocity and acceleration of the guess u_{n+1} = u_n.
+void Motion::begin_step() {
+  const double dt = time_.step;
+  if (time_.scheme == TimeScheme::newmark) {
+    backend_.copy(0, acceleration_, work_);  // a_n
+    backend_.combine(0, -1 / (kBeta * dt), state_.velocity, 1 - 0.5 / kBeta, acceleration_);
+    backend_.add(0, dt * (1 - kGamma), work_, state_.velocity);
+    backend_.add(0, dt * kGamma, acceleration_, state_.velocity);
+    return;
+  }
+  // (u - 2 u_n + u_{n-1}) / dt^2 and (u - u_{n-1}) / (2 dt) with u = u_n
+  backend_.copy(0, state_.memory, acceleration_);
+  backend_.add(0, -1, state_.displacement, acceleration_);
+  backend_.combine(0, -0.5 / dt, acceleration_, 0, state_.velocity);
+  backend_.combine(0, 1 / (dt * dt), acceleration_, 0, acceleration_);
+  backend_.copy(0, state_.displacement, state_.memory);
+}
+
+void Motion::residual(int out) {
+  largest_force_ = backend_.dot(0, state_.external, state_.external);
+  const auto subtract = [&](int force) {
+    backend_.mask(0, force);
+    largest_force_ = std::max(largest_force_, backend_.dot(0, force, force));
+    backend_.add(0, -1, force, out);
+  };
+  backend_.copy(0, state_.external, out);
+  backend_.elastic_force(state_.displacement, work_);
+  subtract(work_);
+  backend_.copy(0, acceleration_, kScratch);
+  backend_.add(0, material_.mass_damping, state_.velocity, kScratch);
+  backend_.apply_scaled({0, 1}, kScratch, work_);
+  subtract(work_);
+  if (material_.stiffness_damping > 0) {
+    backend_.apply_scaled({material_.stiffness_damping, 0}, state_.velocity, work_);
+    subtract(work_);
+  }
+  backend_.mask(0, out);
+  largest_force_ = std::sqrt(largest_force_);
+}
+
+NonlinearStats Motion::step() {
+  NonlinearStats stats;
+  begin_step();
+  backend_.set_operator(
+      {1 + material_.stiffness_damping * velocity_factor(),
+       acceleration_factor() + material_.mass_damping * velocity_factor()});
+  double reference = 0;
+  for (int update = 0; update < setup_.rotation_updates; ++update) {
+    backend_.rotate_cells(state_.displacement);
+    residual(right_);
+    // Later updates correct a small remainder: to the accuracy of the first one is enough.
+    if (update == 0) reference = std::sqrt(backend_.dot(0, right_, right_));
+    solver_.refresh();
+    backend_.zero(0, increment_);
+    const SolveStats solve = solver_.solve(right_, increment_, setup_.tolerance, reference);
+    stats.cycles += solve.cycles;
+    stats.linear_residual = std::max(stats.linear_residual, solve.residual);
+    stats.converged = stats.converged && solve.converged;
+    ++stats.rotation_updates;
+    backend_.add(0, 1, increment_, state_.displacement);
+    backend_.add(0, velocity_factor(), increment_, state_.velocity);
+    backend_.add(0, acceleration_factor(), increment_, acceleration_);
+  }
+  backend_.rotate_cells(state_.displacement);
+  residual(right_);
+  const double norm = std::sqrt(backend_.dot(0, right_, right_));
+  stats.residual = largest_force_ > 0 ? norm / largest_force_ : 0;
+  return stats;
+}
+
+}  // namespace kerf

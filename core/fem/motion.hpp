@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+//
+// Dynamics: one implicit time step, with rotation updates inside it.
+//
+// Newmark (beta 1/4, gamma 1/2), and the survey's scheme with a second difference of u and a
+// central difference for damping, stiffness at the new time. Both start from u_n: with few cycles
+// a predictor as start blows up (docs/convergence.md).
+// Source  [DGW11] section 5; [WWD15] appendix A.4, equations 46 to 48.
+#pragma once
+
+#include <vector>
+
+#include "core/solve/linear_solver.hpp"
+
+namespace kerf {
+
+/// Vectors of the state, on level 0 of the backend.
+struct StateVectors {
+  int displacement = -1;  ///< m
+  int velocity = -1;      ///< m/s
+  int memory = -1;        ///< Newmark: acceleration, m/s^2; central: displacement one step before, m
+  int external = -1;      ///< N
+};
+
+struct NonlinearStats {
+  int rotation_updates = 0;
+  int cycles = 0;
+  double linear_residual = 0;  ///< the largest of the linear solves
+  double residual = 0;         ///< of the equation of motion, relative to its largest term
+  bool converged = true;
+};
+
+class Motion {
+ public:
+  Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time, const Material& material,
+         const SolverSetup& setup, StateVectors state);
+
+  /// Acceleration (or the displacement before) that fits displacement and velocity at the start.
+  void start();
+  NonlinearStats step();
+
+ private:
+  // Coefficients of u_{n+1} in velocity and acceleration.
+  double velocity_factor() const;
+  double acceleration_factor() const;
+  void begin_step();
+  void residual(int out);  // external - elastic - damping - inertia, of the current iterate
+
+  Backend& backend_;
+  LinearSolver& solver_;
+  TimeSetup time_;
+  Material material_;
+  SolverSetup setup_;
+  StateVectors state_;
+  int acceleration_, right_, increment_, work_;
+  double largest_force_ = 0;  // of the terms of the last residual
+};
+
+}  // namespace kerf

@@ -1,0 +1,404 @@
+// SPDX-License-Identifier: MIT
+#include "core/simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/base/error.hpp"
+#include "core/base/memory.hpp"
+#include "core/base/timer.hpp"
+#include "core/body/pieces.hpp"
+#include "core/cut_schedule.hpp"
+#include "core/fem/equilibrium.hpp"
+#include "core/fem/loads.hpp"
+#include "core/fem/motion.hpp"
+#include "core/levels/corners.hpp"
+#include "core/snapshot.hpp"
+#include "kernels/mat3.hpp"
+
+namespace kerf {
+namespace {
+
+// Seconds of the phases that are not the linear solver's.
+struct Clock {
+  double voxelise = 0, cut = 0, structure = 0, load = 0, step = 0;
+};
+
+std::vector<std::shared_ptr<const Solid>> solids_of(const std::vector<Region>& regions) {
+  std::vector<std::shared_ptr<const Solid>> out;
+  for (const Region& region : regions) out.push_back(region.solid);
+  return out;
+}
+
+Voxels voxelise_setup(const SimulationSetup& setup, double& seconds) {
+  const AddTime time(seconds);
+  const Lattice lattice =
+      make_lattice(setup.body.solid->bounds(), setup.body.resolution, setup.body.refinement);
+  return voxelise(*setup.body.solid, lattice, solids_of(setup.regions));
+}
+
+}  // namespace
+
+struct Simulation::Impl {
+  Impl(SimulationSetup given, std::unique_ptr<Backend> machine)
+      : setup(std::move(given)),
+        backend(std::move(machine)),
+        voxels(voxelise_setup(setup, clock.voxelise)),
+        body(voxels, setup.body.refinement),
+        schedule(setup.cuts, setup.time),
+        solver(*backend, setup.solver) {}
+
+  void start();
+  void build_structure();
+  void load_structure();
+  void check_memory() const;
+  void check_held() const;
+  bool apply_cut(const DueCut& due, StepReport& report);
+  void transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
+                std::vector<std::vector<double>> values, const std::vector<double>& rotations);
+  void hold(const std::vector<double>& displacement);
+  double natural_time() const;
+  std::vector<double> read_vector(int x) const;
+  StepReport step();
+
+  SimulationSetup setup;
+  Clock clock;
+  std::unique_ptr<Backend> backend;
+  Voxels voxels;
+  LinkedOctree body;
+  CutSchedule schedule;
+  LinearSolver solver;
+  Hierarchy hierarchy;
+  StateVectors state;
+  std::unique_ptr<Motion> motion;
+  std::unique_ptr<Equilibrium> equilibrium;
+  std::vector<double> held;  // displacement of held components
+  std::vector<std::int32_t> piece;
+  std::size_t pieces = 0, cells_before = 0, hanging = 0, links_cut = 0;
+  int steps = 0;
+  double time = 0;
+  bool prescribed = false;  // some held displacement is not zero, and has not spread yet
+  std::vector<std::string> warnings;
+  Progress progress;
+};
+
+void Simulation::Impl::start() {
+  warnings = voxels.warnings;
+  voxels.label = {};
+  voxels.crossings = {};
+  state.displacement = backend->add_vector();
+  state.velocity = backend->add_vector();
+  state.memory = backend->add_vector();
+  state.external = backend->add_vector();
+  if (setup.time.mode == TimeMode::dynamic)
+    motion = std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver,
+                                      state);
+  else
+    equilibrium =
+        std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
+  build_structure();
+  cells_before = hierarchy.values.size();
+  load_structure();
+  hold(std::vector<double>(held.size(), 0.0));
+  prescribed = std::any_of(held.begin(), held.end(), [](double x) { return x != 0; });
+  if (motion) {
+    const AddTime timer(clock.step);
+    motion->start();
+  }
+  if (equilibrium)
+    equilibrium->on_progress([this](int update, double residual) {
+      if (progress) progress("equilibrium", update, residual);
+    });
+  if (motion)
+    solver.on_progress([this](int cycles, double residual) {
+      if (progress) progress("solve", cycles, residual);
+    });
+}
+
+void Simulation::Impl::build_structure() {
+  const AddTime timer(clock.structure);
+  hierarchy.levels.clear();
+  hierarchy.levels.push_back(finest_level(body));
+  Level& level = hierarchy.levels[0];
+  hierarchy.spacing = body.lattice().spacing;
+  hierarchy.lumped_mass = setup.time.lumped_mass;
+  hierarchy.cut = links_cut > 0;
+  hierarchy.poisson = {setup.material.poisson};
+  for (const Region& region : setup.regions) hierarchy.poisson.push_back(region.material.poisson);
+  const std::vector<std::int32_t> leaves = body.leaves();
+  hierarchy.values.resize(leaves.size());
+  for (std::size_t c = 0; c < leaves.size(); ++c) {
+    const std::uint8_t index = body.nodes()[leaves[c]].material;
+    const Material& material =
+        index == 0 ? setup.material : setup.regions[index - std::size_t{1}].material;
+    const double side = hierarchy.spacing * (1 << level.size_log2[c]);
+    hierarchy.values[c] = {material.young * side, material.density * side * side * side, index};
+  }
+  held = apply_supports(body.lattice(), setup.supports, level);
+  hanging = count_hanging(level);
+  piece = label_pieces(body, &pieces);
+  if (setup.time.mode == TimeMode::statics) check_held();
+  build_coarse_levels(hierarchy, {setup.solver.coarsest_vertices, setup.solver.max_levels,
+                                  setup.solver.duplicate_cells});
+  check_memory();
+}
+
+void Simulation::Impl::load_structure() {
+  {
+    const AddTime timer(clock.load);
+    backend->load(hierarchy);
+    backend->write(0, state.external, external_force(body.lattice(), setup.loads, hierarchy));
+    backend->mask(0, state.external);
+  }
+  solver.set_structure(hierarchy);
+}
+
+// The backend's share, before it is allocated; structure and octree exist already.
+void Simulation::Impl::check_memory() const {
+  double bytes = 0;
+  for (std::size_t l = 0; l < hierarchy.levels.size(); ++l) {
+    const Level& level = hierarchy.levels[l];
+    const double vectors = l == 0 ? kLevelVectors + 30 : kLevelVectors;
+    bytes += static_cast<double>(level.cells()) * (l == 0 ? 224 : 2400 + 192) +
+             static_cast<double>(level.vertices()) * (24 * vectors + 48);
+  }
+  const double available = static_cast<double>(physical_memory());
+  if (bytes < 0.9 * available) return;
+  throw Error(ErrorKind::unavailable,
+              text("this body of ", hierarchy.values.size(), " cells needs about ",
+                   std::ceil(bytes / 1e8) / 10, " GB for its matrices and vectors; this machine has ",
+                   std::floor(available / 1e8) / 10,
+                   " GB; lower body.resolution or raise body.refinement"));
+}
+
+void Simulation::Impl::check_held() const {
+  const Level& level = hierarchy.levels[0];
+  std::vector<char> is_held(pieces, 0);
+  std::vector<std::int32_t> example(pieces, -1), size(pieces, 0);
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    if (example[piece[c]] < 0) example[piece[c]] = c;
+    ++size[piece[c]];
+    for (const std::int32_t v : level.slots[c])
+      if (level.fixed[v] != 0) is_held[piece[c]] = 1;
+  }
+  for (std::size_t p = 0; p < pieces; ++p) {
+    if (is_held[p]) continue;
+    const Vec3d at = body.lattice().point(level.corner[example[p]]);
+    throw Error(
+        ErrorKind::bad_input,
+        text("static mode: piece ", p, " of ", pieces, " (", size[p], " cells, near x = ", at.x,
+             ", y = ", at.y, ", z = ", at.z,
+             " m) is held by no support, so it has no equilibrium; hold it with a [[support]], keep "
+             "the cut from separating it, or use time.mode = \"dynamic\""));
+  }
+}
+
+// Held components of the displacement; `now` for the others.
+void Simulation::Impl::hold(const std::vector<double>& now) {
+  std::vector<double> u = now;
+  const Level& level = hierarchy.levels[0];
+  for (std::int32_t v = 0; v < level.vertices(); ++v)
+    for (int c = 0; c < 3; ++c) {
+      const std::size_t k = 3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(c);
+      if ((level.fixed[v] >> c) & 1) u[k] = held[k];
+    }
+  backend->write(0, state.displacement, u);
+}
+
+std::vector<double> Simulation::Impl::read_vector(int x) const {
+  std::vector<double> out(3 * hierarchy.levels[0].point.size());
+  backend->read(0, x, out);
+  return out;
+}
+
+// A shear wave crosses the body in this time.
+double Simulation::Impl::natural_time() const {
+  const Vec3d extent = setup.body.solid->bounds().extent();
+  const double length = std::max({extent.x, extent.y, extent.z});
+  const double shear = setup.material.young / (2 * (1 + setup.material.poisson));
+  return length / std::sqrt(shear / setup.material.density);
+}
+
+bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
+  const std::vector<std::int32_t> leaves_before = body.leaves();
+  const std::vector<double> u = read_vector(state.displacement);
+  std::vector<Vec3d> corners;
+  if (due.deformed) corners = cell_corners(body.lattice(), hierarchy.levels[0], u);
+  CutEvent event;
+  {
+    const AddTime timer(clock.cut);
+    event = cut(body, corners, due.blade, due.cut_id);
+  }
+  report.cuts.push_back(event);
+  links_cut += event.disconnected.size();
+  if (!event.changed()) return false;
+
+  std::vector<double> rotations(4 * hierarchy.values.size());
+  backend->read_rotations(rotations);
+  std::vector<std::vector<double>> values{u, read_vector(state.velocity),
+                                          read_vector(state.memory)};
+  const Level before = std::move(hierarchy.levels[0]);
+  build_structure();
+  load_structure();
+  transfer(before, leaves_before, std::move(values), rotations);
+  return true;
+}
+
+void Simulation::Impl::transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
+                                std::vector<std::vector<double>> values,
+                                const std::vector<double>& rotations) {
+  const AddTime timer(clock.structure);
+  std::vector<std::int32_t> cell_of(body.nodes().size(), -1);
+  for (std::size_t c = 0; c < leaves_before.size(); ++c)
+    cell_of[leaves_before[c]] = static_cast<std::int32_t>(c);
+  const std::vector<std::int32_t> leaves = body.leaves();
+  std::vector<std::int32_t> origin(leaves.size());
+  std::vector<double> turned(4 * leaves.size());
+  for (std::size_t c = 0; c < leaves.size(); ++c) {
+    std::int32_t leaf = leaves[c];
+    while (cell_of[leaf] < 0) leaf = body.nodes()[leaf].parent;
+    origin[c] = cell_of[leaf];
+    for (std::size_t k = 0; k < 4; ++k)
+      turned[4 * c + k] = rotations[4 * static_cast<std::size_t>(origin[c]) + k];
+  }
+  const Level& after = hierarchy.levels[0];
+  hold(transfer_values(before, values[0], after, origin));
+  backend->write(0, state.velocity, transfer_values(before, values[1], after, origin));
+  backend->write(0, state.memory, transfer_values(before, values[2], after, origin));
+  backend->write_rotations(turned);
+}
+
+StepReport Simulation::Impl::step() {
+  const Timer timer;
+  StepReport report;
+  report.pieces_before = pieces;
+  for (const DueCut& due : schedule.due(steps)) apply_cut(due, report);
+  report.pieces = pieces;
+
+  const AddTime phase(clock.step);
+  const NonlinearStats stats =
+      motion ? motion->step() : equilibrium->solve(natural_time(), prescribed);
+  prescribed = false;
+  ++steps;
+  time = motion ? steps * setup.time.step : steps;
+  report.step = steps;
+  report.time = time;
+  report.rotation_updates = stats.rotation_updates;
+  report.cycles = stats.cycles;
+  report.linear_residual = stats.linear_residual;
+  report.residual = stats.residual;
+  report.converged = stats.converged;
+  report.cells = hierarchy.values.size();
+  report.vertices = hierarchy.levels[0].point.size();
+  report.seconds = timer.seconds();
+  if (!std::isfinite(stats.residual))
+    throw Error(ErrorKind::bad_input,
+                text("the motion blew up in step ", steps,
+                     ": the residual is no number any more; shorten time.step, add damping, or "
+                     "tighten solver.tolerance"));
+  return report;
+}
+
+Simulation::Simulation(SimulationSetup setup, std::unique_ptr<Backend> backend) {
+  expects(backend != nullptr, "Simulation needs a backend; see make_cpu_backend");
+  validate(setup);
+  impl_ = std::make_unique<Impl>(std::move(setup), std::move(backend));
+  impl_->start();
+}
+Simulation::~Simulation() = default;
+Simulation::Simulation(Simulation&&) noexcept = default;
+Simulation& Simulation::operator=(Simulation&&) noexcept = default;
+
+bool Simulation::finished() const { return impl_->steps >= impl_->schedule.steps(); }
+int Simulation::steps_planned() const { return impl_->schedule.steps(); }
+StepReport Simulation::step() { return impl_->step(); }
+void Simulation::on_progress(Progress progress) { impl_->progress = std::move(progress); }
+double Simulation::time() const { return impl_->time; }
+const SimulationSetup& Simulation::setup() const { return impl_->setup; }
+const LinkedOctree& Simulation::body() const { return impl_->body; }
+const Hierarchy& Simulation::hierarchy() const { return impl_->hierarchy; }
+const Backend& Simulation::backend() const { return *impl_->backend; }
+std::size_t Simulation::cells() const { return impl_->hierarchy.values.size(); }
+std::size_t Simulation::cells_before_cuts() const { return impl_->cells_before; }
+std::size_t Simulation::vertices() const { return impl_->hierarchy.levels[0].point.size(); }
+std::size_t Simulation::hanging() const { return impl_->hanging; }
+std::size_t Simulation::pieces() const { return impl_->pieces; }
+std::size_t Simulation::links_cut() const { return impl_->links_cut; }
+const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
+
+std::size_t Simulation::unknowns() const {
+  std::size_t count = 0;
+  for (const std::uint8_t fixed : impl_->hierarchy.levels[0].fixed)
+    for (int c = 0; c < 3; ++c) count += ((fixed >> c) & 1) == 0;
+  return count;
+}
+
+std::size_t Simulation::bytes() const {
+  return impl_->body.bytes() + impl_->hierarchy.bytes() + impl_->backend->bytes() +
+         impl_->solver.bytes();
+}
+
+PhaseTimes Simulation::seconds() const {
+  const Clock& clock = impl_->clock;
+  const SolverTimes& solver = impl_->solver.times();
+  return {{"voxelise", clock.voxelise},
+          {"cut", clock.cut},
+          {"structure", clock.structure + solver.structure},
+          {"load", clock.load},
+          {"values", solver.values},
+          {"solve", solver.solve},
+          {"forces", clock.step - solver.values - solver.solve}};
+}
+
+Snapshot Simulation::snapshot() const {
+  Snapshot out = make_snapshot(impl_->body, impl_->hierarchy,
+                               impl_->read_vector(impl_->state.displacement),
+                               impl_->read_vector(impl_->state.velocity),
+                               impl_->read_vector(impl_->state.external));
+  out.piece = impl_->piece;
+  const Level& level = impl_->hierarchy.levels[0];
+  std::vector<double> rotations(4 * impl_->hierarchy.values.size());
+  impl_->backend->read_rotations(rotations);
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    const std::uint8_t index = impl_->hierarchy.values[c].material;
+    const Material& material = index == 0 ? impl_->setup.material
+                                          : impl_->setup.regions[index - std::size_t{1}].material;
+    out.young.push_back(material.young);
+    out.poisson.push_back(material.poisson);
+    out.density.push_back(material.density);
+    const double* q = rotations.data() + 4 * static_cast<std::size_t>(c);
+    out.rotation.push_back(kernels::to_matrix(kernels::Quat<double>{q[0], q[1], q[2], q[3]}));
+  }
+  return out;
+}
+
+std::uint64_t Simulation::state_hash() const {
+  // FNV-1a over the bits, in vertex order.
+  std::uint64_t hash = 0xCBF29CE484222325U;
+  for (const int x : {impl_->state.displacement, impl_->state.velocity})
+    for (const double value : impl_->read_vector(x)) {
+      std::uint64_t bits;
+      std::memcpy(&bits, &value, sizeof bits);
+      for (int k = 0; k < 8; ++k) {
+        hash ^= (bits >> (8 * k)) & 255;
+        hash *= 0x100000001B3U;
+      }
+    }
+  return hash;
+}
+
+double Simulation::volume() const {
+  const Level& level = impl_->hierarchy.levels[0];
+  double finest = 0;
+  for (const std::uint8_t log2 : level.size_log2) finest += static_cast<double>(1 << (3 * log2));
+  const double h = impl_->hierarchy.spacing;
+  return finest * h * h * h;
+}
+
+std::vector<Vec3d> Simulation::deformed_corners() const {
+  return cell_corners(impl_->body.lattice(), impl_->hierarchy.levels[0],
+                      impl_->read_vector(impl_->state.displacement));
+}
+
+}  // namespace kerf

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#include "core/solve/cycle.hpp"
+
+#include <cmath>
+
+namespace kerf {
+
+void Cycle::descend(int level) {
+  if (level == coarsest_) {
+    backend_.solve_coarsest();
+    return;
+  }
+  backend_.smooth(level, SweepOrder::forward, options_.pre_sweeps);
+  backend_.residual(level);
+  backend_.restrict_residual(level);
+  solve_coarse(level + 1);
+  backend_.prolong_correction(level);
+  backend_.smooth(level, options_.symmetric ? SweepOrder::backward : SweepOrder::forward,
+                  options_.post_sweeps);
+}
+
+void Cycle::solve_coarse(int level) {
+  if (level == coarsest_ || options_.type == CycleType::v) {
+    descend(level);
+  } else if (options_.type == CycleType::w) {
+    descend(level);
+    descend(level);
+  } else {
+    k_step(level);
+  }
+}
+
+// Two steps of flexible conjugate gradients on A u = f of this level, with the cycle below as
+// preconditioner; one step where that already leaves little. Uses the notation of [NV08].
+void Cycle::k_step(int level) {
+  constexpr double kEnough = 0.25;  // their threshold
+  const double norm_before = backend_.dot(level, kRight, kRight);
+  if (norm_before == 0) return;  // u is zero already
+
+  descend(level);
+  backend_.copy(level, kSolution, kKrylovX);
+  backend_.apply(level, kKrylovX, kKrylovV);
+  const double rho = backend_.dot(level, kKrylovX, kKrylovV);
+  const double alpha = backend_.dot(level, kKrylovX, kRight);
+  if (!(rho > 0)) return;
+  const double step = alpha / rho;
+  backend_.add(level, -step, kKrylovV, kRight);
+  if (backend_.dot(level, kRight, kRight) <= kEnough * kEnough * norm_before) {
+    backend_.combine(level, step, kKrylovX, 0, kSolution);
+    return;
+  }
+
+  backend_.zero(level, kSolution);
+  descend(level);
+  backend_.apply(level, kSolution, kScratch);
+  const double gamma = backend_.dot(level, kSolution, kKrylovV);
+  const double beta = backend_.dot(level, kSolution, kScratch);
+  const double alpha2 = backend_.dot(level, kSolution, kRight);
+  const double rho2 = beta - gamma * gamma / rho;
+  if (!(rho2 > 0)) {
+    backend_.combine(level, step, kKrylovX, 0, kSolution);
+    return;
+  }
+  backend_.combine(level, step - gamma * alpha2 / (rho * rho2), kKrylovX, alpha2 / rho2, kSolution);
+}
+
+}  // namespace kerf

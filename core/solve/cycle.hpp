@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+//
+// The multigrid cycle, written once against a Backend.
+//
+// Source  [DGW11] section 6.1; K-cycle: Notay, Vassilevski 2008 [NV08].
+#pragma once
+
+#include "core/backend.hpp"
+#include "core/setup.hpp"
+
+namespace kerf {
+
+struct CycleOptions {
+  CycleType type = CycleType::v;
+  int pre_sweeps = 1, post_sweeps = 1;
+  /// Post-smoothing runs the colours backwards, so that the cycle may precondition CG.
+  bool symmetric = true;
+};
+
+class Cycle {
+ public:
+  Cycle(Backend& backend, int levels, CycleOptions options)
+      : backend_(backend), coarsest_(levels - 1), options_(options) {}
+
+  /// Improves u of A u = f on level 0.
+  void run() { descend(0); }
+
+ private:
+  void descend(int level);
+  void solve_coarse(int level);
+  void k_step(int level);
+
+  Backend& backend_;
+  int coarsest_;
+  CycleOptions options_;
+};
+
+}  // namespace kerf

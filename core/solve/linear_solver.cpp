@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+#include "core/solve/linear_solver.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "core/base/error.hpp"
+#include "core/base/timer.hpp"
+
+namespace kerf {
+
+LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
+    : backend_(backend), setup_(setup) {
+  SmootherOptions smoother;
+  smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
+  smoother.omega = setup.omega;
+  backend_.set_smoother(smoother);
+  if (setup.method == SolverMethod::cg || setup.method == SolverMethod::cg_jacobi) {
+    direction_ = backend_.add_vector();
+    product_ = backend_.add_vector();
+  }
+}
+
+void LinearSolver::set_structure(const Hierarchy& hierarchy) {
+  const AddTime time(times_.structure);
+  hierarchy_ = &hierarchy;
+  cycle_type_ = setup_.cycle;
+  // Measured (docs/convergence.md): on cut bodies the coarse cells are too stiff in bending, and
+  // K-cycles repair it; on uncut ones V costs less.
+  if (cycle_type_ == CycleType::automatic)
+    cycle_type_ = hierarchy.cut ? CycleType::k : CycleType::v;
+  CycleOptions options{cycle_type_, setup_.pre_sweeps, setup_.post_sweeps, true};
+  // As a solver of its own, Gauss-Seidel in one order contracts faster than forward then backward.
+  options.symmetric = setup_.method == SolverMethod::cg;
+  cycle_ = std::make_unique<Cycle>(backend_, static_cast<int>(hierarchy.levels.size()), options);
+  if (setup_.method == SolverMethod::cholesky) {
+    assembled_ = std::make_unique<AssembledLevel>(hierarchy.levels[0]);
+    cholesky_ = std::make_unique<SparseCholesky>(CholeskyEngine::supernodal);
+    cholesky_->analyse(*assembled_);
+  }
+}
+
+void LinearSolver::refresh() {
+  const AddTime time(times_.values);
+  if (setup_.method == SolverMethod::cholesky) {
+    assembled_->assemble(hierarchy_->levels[0], [&](std::int32_t cell, std::span<double> out) {
+      backend_.read_cell_matrix(0, cell, out);
+    });
+    expects(cholesky_->factor(*assembled_),
+            "the stiffness matrix is singular: some part of the body can move freely; hold it with "
+            "a [[support]], or use time.mode = \"dynamic\"");
+    return;
+  }
+  backend_.prepare(0);
+  if (setup_.method == SolverMethod::cg_jacobi) return;
+  const int levels = static_cast<int>(hierarchy_->levels.size());
+  for (int level = 0; level + 1 < levels; ++level) {
+    backend_.coarsen(level);
+    backend_.prepare(level + 1);
+  }
+  backend_.factor_coarsest();
+}
+
+double LinearSolver::true_residual(int b, int x) {
+  backend_.apply(0, x, kRight);
+  backend_.combine(0, 1, b, -1, kRight);
+  return std::sqrt(backend_.dot(0, kRight, kRight));
+}
+
+SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
+  const AddTime time(times_.solve);
+  const double norm_b = std::sqrt(backend_.dot(0, b, b));
+  if (reference <= 0) reference = norm_b;
+  if (reference == 0) {
+    backend_.zero(0, x);
+    return {};
+  }
+  const double goal = tolerance * reference;
+  switch (setup_.method) {
+    case SolverMethod::cholesky:
+      return direct(b, x, reference);
+    case SolverMethod::multigrid:
+      return multigrid(b, x, goal, reference);
+    case SolverMethod::cg_jacobi:
+      return conjugate_gradients(b, x, goal, reference, true);
+    case SolverMethod::cg:
+      break;
+  }
+  return conjugate_gradients(b, x, goal, reference, false);
+}
+
+// z = B r: r is kRight, z becomes kSolution.
+void LinearSolver::precondition(bool jacobi) {
+  if (jacobi) {
+    backend_.precondition_jacobi(0, kRight, kSolution);
+    return;
+  }
+  backend_.zero(0, kSolution);
+  cycle_->run();
+}
+
+// Flexible conjugate gradients: beta from the change of the residual (Polak, Ribiere), because the
+// K-cycle is not quite linear. r lives in kRight, where the cycle reads its right-hand side.
+SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double reference,
+                                             bool jacobi) {
+  const bool fixed = setup_.cycles > 0;
+  const int limit = fixed ? setup_.cycles : (jacobi ? 50 : 1) * setup_.max_cycles;
+  constexpr int kRestarts = 3;  // when the recursion and the true residual part
+  SolveStats stats;
+  double norm = true_residual(b, x);
+  for (int start = 0; start < kRestarts && stats.cycles < limit; ++start) {
+    if (!fixed && norm <= goal) break;
+    double rho = 0, alpha = 0;
+    bool first = true;
+    while (stats.cycles < limit && (fixed || norm > goal)) {
+      precondition(jacobi);
+      const double rho_next = backend_.dot(0, kSolution, kRight);
+      if (!(rho_next > 0)) break;  // r is zero, or rounding has won
+      if (first) {
+        backend_.copy(0, kSolution, direction_);
+      } else {
+        const double beta = -alpha * backend_.dot(0, kSolution, product_) / rho;
+        backend_.combine(0, 1, kSolution, beta, direction_);
+      }
+      first = false;
+      backend_.apply(0, direction_, product_);
+      const double curvature = backend_.dot(0, direction_, product_);
+      if (!(curvature > 0)) break;
+      rho = rho_next;
+      alpha = backend_.dot(0, direction_, kRight) / curvature;
+      backend_.add(0, alpha, direction_, x);
+      backend_.add(0, -alpha, product_, kRight);
+      norm = std::sqrt(backend_.dot(0, kRight, kRight));
+      ++stats.cycles;
+      if (progress_) progress_(stats.cycles, norm / reference);
+    }
+    norm = true_residual(b, x);
+    if (fixed) break;
+  }
+  stats.residual = norm / reference;
+  stats.converged = fixed || norm <= goal * (1 + 1e-12);
+  return stats;
+}
+
+SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) {
+  const bool fixed = setup_.cycles > 0;
+  const int limit = fixed ? setup_.cycles : setup_.max_cycles;
+  SolveStats stats;
+  double norm = true_residual(b, x);
+  while (stats.cycles < limit && (fixed || norm > goal)) {
+    backend_.zero(0, kSolution);
+    cycle_->run();
+    backend_.add(0, 1, kSolution, x);
+    norm = true_residual(b, x);
+    ++stats.cycles;
+    if (progress_) progress_(stats.cycles, norm / reference);
+  }
+  stats.residual = norm / reference;
+  stats.converged = fixed || norm <= goal;
+  return stats;
+}
+
+SolveStats LinearSolver::direct(int b, int x, double reference) {
+  std::vector<double> right(3 * hierarchy_->levels[0].point.size()), solution(right.size());
+  backend_.read(0, b, right);
+  cholesky_->solve(right, solution);
+  backend_.write(0, x, solution);
+  backend_.mask(0, x);
+  return {1, true_residual(b, x) / reference, true};
+}
+
+std::size_t LinearSolver::bytes() const {
+  if (!assembled_) return 0;
+  return assembled_->value.capacity() * 12 + cholesky_->factor_entries() * 12;
+}
+
+}  // namespace kerf

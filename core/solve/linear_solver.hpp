@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+//
+// Solves A x = b on level 0 by the method that the setup names.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/backend.hpp"
+#include "core/setup.hpp"
+#include "core/solve/cycle.hpp"
+#include "core/solve/sparse_cholesky.hpp"
+
+namespace kerf {
+
+/// Not converging is a result. `residual` is the true |b - A x| / reference.
+struct SolveStats {
+  int cycles = 0;
+  double residual = 0;
+  bool converged = true;
+};
+
+/// Seconds of the parts of set-up, summed over calls.
+struct SolverTimes {
+  double structure = 0;  ///< symbolic work: after a cut
+  double values = 0;     ///< coarse matrices, diagonal blocks, factors: every update
+  double solve = 0;
+};
+
+class LinearSolver {
+ public:
+  using Progress = std::function<void(int cycles, double residual)>;
+
+  LinearSolver(Backend& backend, const SolverSetup& setup);
+
+  /// After load(): symbolic work, choice of the cycle.
+  void set_structure(const Hierarchy& hierarchy);
+  /// After set_operator() and rotate_cells(): all values that the method needs.
+  void refresh();
+  /// Improves x until |b - A x| <= tolerance * reference, or by a fixed number of cycles.
+  /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
+  SolveStats solve(int b, int x, double tolerance, double reference = 0);
+
+  CycleType cycle_in_use() const { return cycle_type_; }
+  const SolverTimes& times() const { return times_; }
+  void on_progress(Progress progress) { progress_ = std::move(progress); }
+  std::size_t bytes() const;
+
+ private:
+  SolveStats conjugate_gradients(int b, int x, double goal, double reference, bool jacobi);
+  SolveStats multigrid(int b, int x, double goal, double reference);
+  SolveStats direct(int b, int x, double reference);
+  double true_residual(int b, int x);  // leaves b - A x in kRight
+  void precondition(bool jacobi);
+
+  Backend& backend_;
+  SolverSetup setup_;
+  const Hierarchy* hierarchy_ = nullptr;
+  CycleType cycle_type_ = CycleType::v;
+  std::unique_ptr<Cycle> cycle_;
+  std::unique_ptr<AssembledLevel> assembled_;
+  std::unique_ptr<SparseCholesky> cholesky_;
+  int direction_ = -1, product_ = -1;  // of conjugate gradients
+  SolverTimes times_;
+  Progress progress_;
+};
+
+}  // namespace kerf
