@@ -19,20 +19,18 @@ constexpr double kMaxBladeRatio = 1e6;
 /// A crossing of one half of a link.
 struct Hit {
   LinkKey key = 0;
-  int end = 0;      ///< whose half it is: 0 the lower cell's
-  double t = 0;     ///< 0 at that cell's centre, 1 at the centre of the shared face
-  Vec3f normal{};   ///< unit, reference state
+  int end = 0;     ///< whose half it is: 0 the lower cell's
+  double t = 0;    ///< 0 at that cell's centre, 1 at the centre of the shared face
+  Vec3f normal{};  ///< unit, reference state
 };
 
-double largest(const Vec3d& v) {
-  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-}
+double largest(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 /// A triangle on the integer lattice, and its plane in doubles for quick rejection.
 struct BladeTriangle {
   std::array<Int3, 3> points{};
-  Box3 box;         ///< with the margin that covers rounding
-  Vec3d normal{};   ///< unit
+  Box3 box;        ///< with the margin that covers rounding
+  Vec3d normal{};  ///< unit
   Vec3d point{};
   double margin = 0;
 
@@ -224,9 +222,9 @@ class LinkSearch {
   const LinkedOctree& body_;
   std::span<const Vec3d> corners_;
   Quantiser quantiser_;
-  double reach_;    // of the parts of a triangle that are searched at a time, m
-  double margin_;   // covers the rounding of every box, m
-  std::vector<Box3> boxes_;           // of the leaves near the blade
+  double reach_;             // of the parts of a triangle that are searched at a time, m
+  double margin_;            // covers the rounding of every box, m
+  std::vector<Box3> boxes_;  // of the leaves near the blade
   std::vector<CellMap> near_;
   Bvh tree_;
   std::vector<std::int32_t> tested_;  // per near leaf: the last triangle it was tested against
@@ -306,8 +304,7 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
   for (std::size_t begin = 0, end = 0; begin < hits.size(); begin = end) {
     const LinkKey key = hits[begin].key;
     while (end < hits.size() && hits[end].key == key) ++end;
-    const LinkCut record =
-        nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id);
+    const LinkCut record = nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id);
     ++event.links_hit;
     if (body.disconnect(lattice.link_lower(key), Lattice::link_axis(key), record))
       event.disconnected.push_back(key);

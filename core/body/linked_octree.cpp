@@ -45,7 +45,8 @@ void check(const Voxels& voxels, int refinement) {
           text("refinement must lie between 0 and ", kMaxRefinement));
   expects(lattice.size[0] > 0 && lattice.size[1] > 0 && lattice.size[2] > 0 && lattice.spacing > 0,
           "the lattice needs at least one cell along each axis, and a positive spacing");
-  expects(voxels.label.size() == lattice.cells(), "the labels must number one for each lattice cell");
+  expects(voxels.label.size() == lattice.cells(),
+          "the labels must number one for each lattice cell");
   for (const auto& crossing : voxels.crossings)
     expects(valid_key(lattice, crossing.first), "a crossed link lies outside the lattice");
 }
@@ -94,9 +95,9 @@ class LinkedOctree::Pyramid {
     const Lattice& lattice = voxels.lattice;
     std::vector<std::uint8_t>& bits = level_[0].bits;
     bits.assign(lattice.cells(), 0);
-    const std::size_t step[3] = {1, static_cast<std::size_t>(lattice.size[0]),
-                                 static_cast<std::size_t>(lattice.size[0]) *
-                                     static_cast<std::size_t>(lattice.size[1])};
+    const std::size_t step[3] = {
+        1, static_cast<std::size_t>(lattice.size[0]),
+        static_cast<std::size_t>(lattice.size[0]) * static_cast<std::size_t>(lattice.size[1])};
     std::size_t i = 0;
     for (Vec3i c{}; c[2] < lattice.size[2]; ++c[2])
       for (c[1] = 0; c[1] < lattice.size[1]; ++c[1])
@@ -242,8 +243,9 @@ std::vector<std::int32_t> LinkedOctree::leaves() const {
     const Node& node = nodes_[i];
     if (node.present == 0 || node.first_child >= 0) continue;
     // The index of the corner grows with (z, y, x); lattices stay far below 2^58 cells.
-    order.emplace_back(static_cast<std::uint64_t>(node.size_log2) << 58 | lattice_.index(node.corner),
-                       static_cast<std::int32_t>(i));
+    order.emplace_back(
+        static_cast<std::uint64_t>(node.size_log2) << 58 | lattice_.index(node.corner),
+        static_cast<std::int32_t>(i));
   }
   std::sort(order.begin(), order.end());
 
@@ -261,11 +263,11 @@ std::int32_t LinkedOctree::child_at(std::int32_t node, const Vec3i& c) const {
 
 std::int32_t LinkedOctree::leaf_at(const Vec3i& c) const {
   if (!lattice_.inside(c)) return -1;
-  const auto root = static_cast<std::size_t>(c[0] >> refinement_) +
-                    static_cast<std::size_t>(roots_[0]) *
-                        (static_cast<std::size_t>(c[1] >> refinement_) +
-                         static_cast<std::size_t>(roots_[1]) *
-                             static_cast<std::size_t>(c[2] >> refinement_));
+  const auto root =
+      static_cast<std::size_t>(c[0] >> refinement_) +
+      static_cast<std::size_t>(roots_[0]) *
+          (static_cast<std::size_t>(c[1] >> refinement_) +
+           static_cast<std::size_t>(roots_[1]) * static_cast<std::size_t>(c[2] >> refinement_));
   std::int32_t n = root_[root];
   if (n < 0) return -1;
   while (nodes_[static_cast<std::size_t>(n)].first_child >= 0) n = child_at(n, c);

@@ -13,8 +13,8 @@ namespace kerf {
 
 /// Two face-adjacent leaves that at least one connected finest link joins.
 struct LeafLink {
-  std::int32_t a = 0;     ///< the leaf on the low side, in the order of LinkedOctree::leaves()
-  std::int32_t b = 0;     ///< the leaf on the high side
+  std::int32_t a = 0;  ///< the leaf on the low side, in the order of LinkedOctree::leaves()
+  std::int32_t b = 0;  ///< the leaf on the high side
   std::uint8_t axis = 0;
 };
 

@@ -180,10 +180,9 @@ TEST(Cut, BladeThroughGridPointsOfAnyLatticeLeavesTwoPieces) {
 TEST(Cut, OctreeIsCutAsTheUniformGridIs) {
   const Voxels voxels = ball_body(24);
   const Vec3d middle = at(voxels.lattice, 12, 12, 12);
-  const TriangleMesh blades[] = {plane_blade(middle, {1, 0, 0}, 2),
-                                 plane_blade(middle, {0.3, 1, -0.6}, 2),
-                                 plane_blade(middle, {1, 1, 1}, 0.3),
-                                 sweep(arc_lines(middle, 0.4, 0.7, 17))};
+  const TriangleMesh blades[] = {
+      plane_blade(middle, {1, 0, 0}, 2), plane_blade(middle, {0.3, 1, -0.6}, 2),
+      plane_blade(middle, {1, 1, 1}, 0.3), sweep(arc_lines(middle, 0.4, 0.7, 17))};
   for (const TriangleMesh& blade : blades) {
     LinkedOctree uniform(voxels, 0);
     cut(uniform, {}, blade, 1);
@@ -224,8 +223,8 @@ TEST(Cut, RotatedBodyIsCutAsThePulledBackBladeCutsIt) {
     return std::cos(1.1) * r + std::sin(1.1) * cross(axis, r) +
            ((1 - std::cos(1.1)) * dot(axis, r)) * axis + Vec3d{3, -1, 2};
   };
-  for (const TriangleMesh& blade : {plane_blade(middle, {0.31, 1, -0.64}, 2),
-                                    sweep(arc_lines(middle, 0.4, 0.7, 17))}) {
+  for (const TriangleMesh& blade :
+       {plane_blade(middle, {0.31, 1, -0.64}, 2), sweep(arc_lines(middle, 0.4, 0.7, 17))}) {
     LinkedOctree reference(voxels, 2), turned(voxels, 2);
 
     cut(reference, {}, blade, 1);
@@ -350,10 +349,10 @@ TEST(Cut, ClosedBladeInsideTheBodyFreesItsInside) {
   const Vec3d c = at(body.lattice(), 8.1, 7.9, 8.2);
   const double r = 0.3;
   // An octahedron.
-  const TriangleMesh blade{{c + Vec3d{r, 0, 0}, c - Vec3d{r, 0, 0}, c + Vec3d{0, r, 0},
-                            c - Vec3d{0, r, 0}, c + Vec3d{0, 0, r}, c - Vec3d{0, 0, r}},
-                           {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
-                            {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
+  const TriangleMesh blade{
+      {c + Vec3d{r, 0, 0}, c - Vec3d{r, 0, 0}, c + Vec3d{0, r, 0}, c - Vec3d{0, r, 0},
+       c + Vec3d{0, 0, r}, c - Vec3d{0, 0, r}},
+      {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
 
   cut(body, {}, blade, 1);
 
@@ -441,7 +440,8 @@ TEST(Cut, BladeThatMissesOrIsEmptyChangesNothing) {
   EXPECT_FALSE(cut(body, {}, TriangleMesh{}, 1).changed());
   EXPECT_FALSE(cut(body, {}, plane_blade({50, 0, 0}, {1, 0, 0}, 1), 1).changed());
   // Beside the lattice, and between the rim and the outermost centres.
-  EXPECT_EQ(cut(body, {}, plane_blade(at(voxels.lattice, -1, 4, 4), {1, 0, 0}, 1), 1).links_hit, 0u);
+  EXPECT_EQ(cut(body, {}, plane_blade(at(voxels.lattice, -1, 4, 4), {1, 0, 0}, 1), 1).links_hit,
+            0u);
   EXPECT_EQ(cut(body, {}, plane_blade(at(voxels.lattice, 0.3, 4, 4), {1, 0, 0}, 1), 1).links_hit,
             0u);
   EXPECT_EQ(cut_links(body).size(), 0u);

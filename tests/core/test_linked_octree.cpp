@@ -69,7 +69,8 @@ TEST(LinkedOctree, AdaptiveCellCountsMatchCountsByHand) {
   // 4^3 cells of size 2; all but the inner 2^3 touch the surface: 56 * 8 + 8.
   EXPECT_EQ(sizes(LinkedOctree(box_body({8, 8, 8}), 1)),
             (std::map<int, std::size_t>{{0, 448}, {1, 8}}));
-  // Of 4^3 roots of size 4 the outer 56 are split; of 8^3 cells of size 2 the outer 8^3 - 6^3 = 296.
+  // Of 4^3 roots of size 4 the outer 56 are split; of 8^3 cells of size 2 the outer 8^3 - 6^3 =
+  // 296.
   EXPECT_EQ(sizes(LinkedOctree(box_body({16, 16, 16}), 2)),
             (std::map<int, std::size_t>{{0, 2368}, {1, 448 - 296}, {2, 8}}));
 }
@@ -84,8 +85,8 @@ TEST(LinkedOctree, CutSplitsWhatBalanceAndItsNeighbourhoodAskFor) {
 
   EXPECT_TRUE(body.disconnect({8, 9, 9}, 0, halfway(body.lattice(), 0, 1)));
 
-  EXPECT_EQ(sizes(body), (std::map<int, std::size_t>{
-                             {0, finest + 32}, {1, middle + 18 * 8 - 4}, {2, 64 - 18}}));
+  EXPECT_EQ(sizes(body),
+            (std::map<int, std::size_t>{{0, finest + 32}, {1, middle + 18 * 8 - 4}, {2, 64 - 18}}));
   EXPECT_EQ(body.splits(), 18u + 4u);
   EXPECT_TRUE(invariants_hold(body, voxels.label));
 }
@@ -118,12 +119,12 @@ TEST(LinkedOctree, BoxesWithAGapThinnerThanACellStayApart) {
 
 TEST(LinkedOctree, RefinesAtMaterialJumpsAndKeepsTheirLinksConnected) {
   // Jump between x = 11 and 12 of a 24^3 box: cells of size 2 at x = 10 and 12 are split.
-  const Voxels voxels = make_voxels(lattice_of({24, 24, 24}),
-                                    [](const Vec3i& c) { return c[0] < 12 ? 1 : 2; });
+  const Voxels voxels =
+      make_voxels(lattice_of({24, 24, 24}), [](const Vec3i& c) { return c[0] < 12 ? 1 : 2; });
   const LinkedOctree body(voxels, 1);
 
-  EXPECT_EQ(sizes(body), (std::map<int, std::size_t>{{0, 8 * (728 + 2 * 10 * 10)},
-                                                     {1, 1000 - 2 * 10 * 10}}));
+  EXPECT_EQ(sizes(body),
+            (std::map<int, std::size_t>{{0, 8 * (728 + 2 * 10 * 10)}, {1, 1000 - 2 * 10 * 10}}));
   EXPECT_EQ(connected_links(body), 3u * 24 * 24 * 23);
   EXPECT_TRUE(invariants_hold(body, voxels.label));
 }

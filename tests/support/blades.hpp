@@ -49,7 +49,8 @@ inline std::vector<CutLine> arc_lines(const Vec3d& center, double radius, double
 inline TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
   const auto shift = static_cast<std::int32_t>(a.points.size());
   a.points.insert(a.points.end(), b.points.begin(), b.points.end());
-  for (const auto& t : b.triangles) a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  for (const auto& t : b.triangles)
+    a.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
   return a;
 }
 

@@ -24,9 +24,9 @@ std::vector<Vec3d> corners_of(const LinkedOctree& body, const Map& map) {
     const auto& n = body.nodes()[static_cast<std::size_t>(leaf)];
     const int size = 1 << n.size_log2;
     for (int i = 0; i < 8; ++i)
-      corners.push_back(map(body.lattice().point(
-          {n.corner[0] + (i & 1) * size, n.corner[1] + (i >> 1 & 1) * size,
-           n.corner[2] + (i >> 2) * size})));
+      corners.push_back(
+          map(body.lattice().point({n.corner[0] + (i & 1) * size, n.corner[1] + (i >> 1 & 1) * size,
+                                    n.corner[2] + (i >> 2) * size})));
   }
   return corners;
 }
@@ -77,8 +77,8 @@ inline std::map<LinkKey, std::array<double, 2>> crossed_links(const LinkedOctree
                              blade.points[static_cast<std::size_t>(t[1])],
                              blade.points[static_cast<std::size_t>(t[2])]);
         if (!at) continue;
-        auto& best = found.try_emplace(body.lattice().link_key(c, axis), std::array{h, h})
-                         .first->second;
+        auto& best =
+            found.try_emplace(body.lattice().link_key(c, axis), std::array{h, h}).first->second;
         best[end] = std::min(best[end], 0.5 * h * *at);
         best[1 - end] = std::min(best[1 - end], h - 0.5 * h * *at);
       }

@@ -111,8 +111,7 @@ inline ::testing::AssertionResult tree_holds(const PaintedLeaves& p,
     const Vec3i c = p.octree.lattice().cell(i);
     inside += label[i] != 0 ? 1 : 0;
     if ((p.place[i] >= 0) != (label[i] != 0)) return broken("cell lost or invented", c);
-    if (label[i] != 0 && p.node(p.place[i]).material + 1 != label[i])
-      return broken("material", c);
+    if (label[i] != 0 && p.node(p.place[i]).material + 1 != label[i]) return broken("material", c);
     const std::int32_t at = p.octree.leaf_at(c);
     if (at != (p.place[i] < 0 ? -1 : p.leaves[static_cast<std::size_t>(p.place[i])]))
       return broken("leaf_at", c);
@@ -174,8 +173,7 @@ inline ::testing::AssertionResult links_hold(const PaintedLeaves& p) {
     if (record == nullptr) return;
     ++records;
     for (const LinkEnd& end : record->end)
-      if (!(end.distance >= 0 &&
-            end.distance <= static_cast<float>(p.octree.lattice().spacing) &&
+      if (!(end.distance >= 0 && end.distance <= static_cast<float>(p.octree.lattice().spacing) &&
             std::abs(norm(end.normal) - 1) < kUnit))
         result = broken("record out of range", c);
   });

@@ -121,8 +121,8 @@ class RandomBlades {
       default:  // curved, or closed
         return dice_.roll(2) == 0
                    ? sweep(arc_lines(here, body() * dice_.between(0.2, 0.6), body(), 7))
-                   : stamp_blade(here.x, here.y, body() * dice_.between(0.1, 0.4), here.z,
-                                 there.z, 9);
+                   : stamp_blade(here.x, here.y, body() * dice_.between(0.1, 0.4), here.z, there.z,
+                                 9);
     }
   }
 
