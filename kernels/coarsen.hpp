@@ -34,18 +34,40 @@ KERF_HD WeightColumns<T> compress_columns(const T (&w)[kCorners][kCorners]) {
   return out;
 }
 
-/// strip = A W for one coarse slot: 24 rows of three columns.
+/// The full square of a packed matrix: read once, and by rows from here on.
 template <class T, class Matrix>
-KERF_HD void gather_strip(const Matrix& A, const WeightColumns<T>& columns, int n,
-                          T (&strip)[kUnknowns][3]) {
+KERF_HD void expand_packed(const Matrix& A, T (&full)[kUnknowns][kUnknowns]) {
   for (int row = 0; row < kUnknowns; ++row)
+    for (int col = 0; col <= row; ++col)
+      full[row][col] = full[col][row] = A[packed_index(row, col)];
+}
+
+/// strip = (A W)^T for one coarse slot: three rows of 24, sums of whole rows of A = A^T.
+template <class T>
+KERF_HD void gather_strip(const T (&full)[kUnknowns][kUnknowns], const WeightColumns<T>& columns,
+                          int n, T (&strip)[3][kUnknowns]) {
+  for (int b = 0; b < 3; ++b)
+    for (int col = 0; col < kUnknowns; ++col) strip[b][col] = T(0);
+  for (int k = 0; k < columns.count[n]; ++k)
     for (int b = 0; b < 3; ++b) {
-      T sum = T(0);
-      for (int k = 0; k < columns.count[n]; ++k)
-        sum =
-            fma(columns.weight[n][k], T(symmetric_entry(A, row, 3 * columns.child[n][k] + b)), sum);
-      strip[row][b] = sum;
+      const int row = 3 * columns.child[n][k] + b;
+      for (int col = 0; col < kUnknowns; ++col)
+        strip[b][col] = fma(columns.weight[n][k], full[row][col], strip[b][col]);
     }
+}
+
+/// Block (m, n) of W^T A W from the strip of n.
+template <class T>
+KERF_HD Mat3<T> gather_block(const T (&strip)[3][kUnknowns], const WeightColumns<T>& columns,
+                             int m) {
+  Mat3<T> block;
+  for (int k = 0; k < columns.count[m]; ++k) {
+    const int first = 3 * columns.child[m][k];
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        block[a][b] = fma(columns.weight[m][k], strip[b][first + a], block[a][b]);
+  }
+  return block;
 }
 
 /// coarse += W^T A W.
@@ -55,18 +77,18 @@ KERF_HD void gather_strip(const Matrix& A, const WeightColumns<T>& columns, int 
 template <class T, class Matrix, class Out>
 KERF_HD void coarsen_cell(const Matrix& A, const T (&w)[kCorners][kCorners], Out coarse) {
   const WeightColumns<T> columns = compress_columns(w);
-  T strip[kUnknowns][3];
+  T full[kUnknowns][kUnknowns];
+  T strip[3][kUnknowns];
+  expand_packed(A, full);
   for (int n = 0; n < kCorners; ++n) {
     if (columns.count[n] == 0) continue;
-    gather_strip(A, columns, n, strip);
-    for (int m = n; m < kCorners; ++m)
+    gather_strip(full, columns, n, strip);
+    for (int m = n; m < kCorners; ++m) {
+      const Mat3<T> block = gather_block(strip, columns, m);
       for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < (m == n ? a + 1 : 3); ++b) {
-          T sum = T(0);
-          for (int k = 0; k < columns.count[m]; ++k)
-            sum = fma(columns.weight[m][k], strip[3 * columns.child[m][k] + a][b], sum);
-          coarse[packed_index(3 * m + a, 3 * n + b)] += sum;
-        }
+        for (int b = 0; b < (m == n ? a + 1 : 3); ++b)
+          coarse[packed_index(3 * m + a, 3 * n + b)] += block[a][b];
+    }
   }
 }
 
