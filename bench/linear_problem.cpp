@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+#include "bench/linear_problem.hpp"
+
+#include <cmath>
+
+#include "core/base/timer.hpp"
+#include "core/body/cut.hpp"
+#include "core/fem/loads.hpp"
+#include "cpu/cpu_backend.hpp"
+
+namespace kerf::bench {
+namespace {
+
+std::vector<double> noise(std::size_t size) {
+  std::vector<double> out(size);
+  std::uint64_t state = 1;
+  for (double& value : out) {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    value = static_cast<double>(state >> 11) * 0x1p-52 - 1;
+  }
+  return out;
+}
+
+}  // namespace
+
+LinearProblem::LinearProblem(const ProblemSetup& setup) : setup_(setup) {
+  const Box3 cube{{0, 0, 0}, {1, 1, 1}};
+  const Lattice lattice = make_lattice(cube, setup.cells, setup.refinement);
+  LinkedOctree body(voxelise(*make_box(cube), lattice), setup.refinement);
+  std::int32_t id = 0;
+  for (const TriangleMesh& blade : setup.blades) cut(body, {}, blade, ++id);
+
+  hierarchy_.levels.push_back(finest_level(body));
+  hierarchy_.spacing = lattice.spacing;
+  hierarchy_.poisson = {setup.poisson};
+  hierarchy_.cut = id > 0;
+  for (const std::uint8_t log2 : hierarchy_.levels[0].size_log2) {
+    const double side = lattice.spacing * (1 << log2);
+    hierarchy_.values.push_back({side, side * side * side, 0});
+  }
+  apply_supports(lattice, {{{{-1, -1e-9, -1}, {2, 1e-9, 2}}, {}, {true, true, true}}},
+                 hierarchy_.levels[0]);
+  build_coarse_levels(hierarchy_, {setup.solver.coarsest_vertices, setup.solver.max_levels,
+                                   setup.solver.duplicate_cells});
+
+  backend_ = make_cpu_backend({setup.solver.threads, 0});
+  solver_ = std::make_unique<LinearSolver>(*backend_, setup.solver);
+  b_ = backend_->add_vector();
+  x_ = backend_->add_vector();
+  backend_->load(hierarchy_);
+  OperatorScale scale;
+  if (setup.courant > 0) {
+    const double shear_speed = std::sqrt(1 / (2 * (1 + setup.poisson)));  // E = density = 1
+    const double dt = setup.courant / shear_speed;
+    scale.mass = 4 / (dt * dt);  // Newmark, beta 1/4
+  }
+  backend_->set_operator(scale);
+  backend_->write(0, b_, external_force(lattice, {Gravity{{0.3, -1, 0.2}}}, hierarchy_));
+  backend_->mask(0, b_);
+  solver_->set_structure(hierarchy_);
+  solver_->refresh();
+}
+
+double LinearProblem::error(int x) const {
+  std::vector<double> now(exact_.size());
+  backend_->read(0, x, now);
+  double sum = 0;
+  for (std::size_t i = 0; i < now.size(); ++i) sum += (now[i] - exact_[i]) * (now[i] - exact_[i]);
+  return std::sqrt(sum) / norm_exact_;
+}
+
+Convergence LinearProblem::measure(bool error_of_cg) {
+  Convergence out;
+  for (const Level& level : hierarchy_.levels) out.vertices.push_back(level.vertices());
+
+  // The error of A u = 0 is u itself; the largest eigenvector of the cycle remains.
+  constexpr int kCycles = 60, kLast = 8;
+  SolverSetup alone = setup_.solver;
+  Cycle cycle(*backend_, static_cast<int>(hierarchy_.levels.size()),
+              {solver_->cycle_in_use(), alone.pre_sweeps, alone.post_sweeps,
+               alone.method == SolverMethod::cg});
+  backend_->zero(0, kRight);
+  backend_->write(0, kSolution, noise(3 * hierarchy_.levels[0].point.size()));
+  backend_->mask(0, kSolution);
+  double before = 0;
+  const Timer timer;
+  for (int i = 0; i < kCycles; ++i) {
+    if (i == kCycles - kLast) before = std::sqrt(backend_->dot(0, kSolution, kSolution));
+    cycle.run();
+  }
+  out.seconds_per_cycle = timer.seconds() / kCycles;
+  const double after = std::sqrt(backend_->dot(0, kSolution, kSolution));
+  out.factor = std::pow(after / before, 1.0 / kLast);
+  if (!error_of_cg) return out;
+
+  backend_->zero(0, x_);
+  solver_->solve(b_, x_, 1e-14);
+  exact_.resize(3 * hierarchy_.levels[0].point.size());
+  backend_->read(0, x_, exact_);
+  norm_exact_ = std::sqrt(backend_->dot(0, x_, x_));
+
+  backend_->zero(0, x_);
+  solver_->on_progress([&](int iteration, double) {
+    if (out.cg_1e10 >= 0) return;
+    const double now = error(x_);
+    if (out.cg_1e6 < 0 && now <= 1e-6) out.cg_1e6 = iteration;
+    if (now <= 1e-10) out.cg_1e10 = iteration;
+  });
+  solver_->solve(b_, x_, 1e-13);
+  solver_->on_progress({});
+
+  backend_->copy(0, b_, kRight);
+  backend_->zero(0, kSolution);
+  for (int i = 0; i < 3; ++i) cycle.run();
+  out.three_cycles = error(kSolution);
+  return out;
+}
+
+}  // namespace kerf::bench
