@@ -123,10 +123,6 @@ class Run {
       note(step);
       bar_.finished(step);
       if (step.step % scene_.output.every == 0) write_snapshot();
-      if (!std::isfinite(step.residual)) {
-        diverged_ = true;
-        break;
-      }
     }
     summary_.interrupted = InterruptGuard::asked() && !simulation_.finished();
     simulation_.on_progress({});
@@ -156,7 +152,6 @@ class Run {
   void draw() {
     if (!scene_.output.preview) return;
     try {
-      if (diverged_) throw Error(ErrorKind::unavailable, "the positions are not finite");
       draw_preview(results_.add_file("preview.png"), snapshot_,
                    {.up = up_direction(scene_.setup)});
       drawn_ = true;
@@ -192,7 +187,7 @@ class Run {
     summary_.precision = precision_name(scene_.setup.solver.precision);
     summary_.state_hash = s.state_hash();
     summary_.warnings.insert(summary_.warnings.begin(), s.warnings().begin(), s.warnings().end());
-    if (!summary_.interrupted && !diverged_)
+    if (!summary_.interrupted)
       missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
     if (!missed_.empty()) summary_.warnings.push_back(missed_);
   }
@@ -209,12 +204,12 @@ class Run {
 
   int status() {
     if (!missed_.empty()) complain("error: " + missed_);
-    if (not_converged_ > 0 || diverged_) {
-      const StepReport& step = not_converged_ > 0 ? first_not_converged_ : summary_.steps.back();
+    if (not_converged_ > 0) {
+      const StepReport& step = first_not_converged_;
       complain(fmt::format(
           "error: not converged in {} of {} steps, first in step {}: linear residual {:.2e}, "
           "residual {:.2e} after {} cycles; results are kept",
-          std::max(not_converged_, 1), summary_.steps.size(), step.step, step.linear_residual,
+          not_converged_, summary_.steps.size(), step.step, step.linear_residual,
           step.residual, step.cycles));
     }
     if (summary_.interrupted) {
@@ -223,7 +218,7 @@ class Run {
       return kInterrupted;
     }
     if (!missed_.empty()) return kBadInput;
-    return not_converged_ > 0 || diverged_ ? kNotConverged : kDone;
+    return not_converged_ > 0 ? kNotConverged : kDone;
   }
 
   const Scene& scene_;
@@ -239,7 +234,7 @@ class Run {
   std::size_t warnings_said_ = 0;
   StepReport first_not_converged_;
   int last_written_ = -1, not_converged_ = 0;
-  bool diverged_ = false, drawn_ = false;
+  bool drawn_ = false;
 };
 
 }  // namespace

@@ -367,7 +367,6 @@ Scene read_scene_text(const std::string& toml, const fs::path& file,
   scene.file = file;
   const SceneSource source(toml, file, overrides);
   SceneTable root(source.root(), source, "", "the scene", scene.places);
-  scene.places[""] = file.string();
   read_sections(root, scene);
   return scene;
 }

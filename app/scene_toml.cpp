@@ -159,6 +159,7 @@ void SceneSource::apply(const std::string& argument) {
 }
 
 std::string SceneSource::place(const std::string& path, const toml::source_region& region) const {
+  if (path.empty()) return file_.string();
   for (auto it = overrides_.rbegin(); it != overrides_.rend(); ++it)
     if (it->first == path || begins_with_part(path, it->first)) return "--set " + it->second;
   if (region.begin.line > 0) return text(file_.string(), ":", region.begin.line);

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <regex>
+
+#include "app/preview.hpp"
+#include "app/preview_surface.hpp"
+#include "app/progress.hpp"
+#include "app/results.hpp"
+#include "core/base/error.hpp"
+
+namespace kerf {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Two unit cells side by side along x that share no vertex: the link between them is cut.
+Snapshot two_cut_cells() {
+  Snapshot s;
+  for (int c = 0; c < 2; ++c) {
+    std::array<std::int32_t, 8> cell;
+    for (int k = 0; k < 8; ++k) {
+      cell[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(s.points.size());
+      s.points.push_back({c + double(k & 1), double(k >> 1 & 1), double(k >> 2)});
+      s.displacement.push_back({0.1 * c, 0.01 * k, 0});
+      s.velocity.push_back({0, 0, 1.0 * c});
+      s.external_force.push_back({0, -1.0 / 3.0, 0});
+      s.fixed.push_back(c == 0 && k == 0 ? 7 : 0);
+      s.masters.push_back({-1, -1, -1, -1});
+    }
+    s.cells.push_back(cell);
+    s.size_log2.push_back(0);
+    s.piece.push_back(c);
+    s.young.push_back(1e4 + c);
+    s.poisson.push_back(0.4);
+    s.density.push_back(1000);
+    s.rotation.push_back(Mat3d::identity());
+    for (int face = 0; face < 6; ++face)
+      s.boundary.push_back({c, face, face == (c == 0 ? 1 : 0) ? 1 : 0});
+  }
+  s.masters[3] = {0, 1, -1, -1};
+  return s;
+}
+
+std::string read_all(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// The values of one array of a .vtu, found as a reader would: by its offset in the appended data.
+template <class T>
+std::vector<T> vtu_array(const std::string& vtu, const std::string& name) {
+  std::smatch match;
+  const std::regex pattern("Name=\"" + name + "\"[^>]*offset=\"([0-9]+)\"");
+  const std::string head = vtu.substr(0, vtu.find("<AppendedData"));
+  EXPECT_TRUE(std::regex_search(head, match, pattern)) << name;
+  const std::size_t data = vtu.find('_', vtu.find("<AppendedData")) + 1;
+  const std::size_t at = data + std::stoul(match[1]);
+  std::uint64_t bytes = 0;
+  std::memcpy(&bytes, vtu.data() + at, sizeof bytes);
+  std::vector<T> values(bytes / sizeof(T));
+  std::memcpy(values.data(), vtu.data() + at + sizeof bytes, bytes);
+  return values;
+}
+
+class ResultsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::path(testing::TempDir()) / ("kerf_results_" + std::string(testing::UnitTest::GetInstance()
+                                                                              ->current_test_info()
+                                                                              ->name()));
+    fs::remove_all(root_);
+    fs::create_directories(root_);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+  std::vector<std::string> names(const fs::path& folder) {
+    std::vector<std::string> all;
+    for (const auto& entry : fs::directory_iterator(folder))
+      all.push_back(entry.path().filename().string());
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+  void touch(const fs::path& file) { std::ofstream(file) << "x"; }
+  fs::path root_;
+};
+
+TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
+  const Snapshot s = two_cut_cells();
+  write_vtu(root_ / "a.vtu", s);
+  const std::string vtu = read_all(root_ / "a.vtu");
+
+  EXPECT_NE(vtu.find("NumberOfPoints=\"16\" NumberOfCells=\"2\""), std::string::npos);
+  const auto points = vtu_array<double>(vtu, "Points");
+  const auto force = vtu_array<double>(vtu, "external_force");
+  const auto displacement = vtu_array<double>(vtu, "displacement");
+  ASSERT_EQ(points.size(), 48u);
+  ASSERT_EQ(displacement.size(), 48u);
+  for (std::size_t i = 0; i < 16; ++i) {
+    EXPECT_EQ(points[3 * i], s.points[i].x);
+    EXPECT_EQ(displacement[3 * i + 1], s.displacement[i].y);
+    EXPECT_EQ(force[3 * i + 1], -1.0 / 3.0);
+  }
+  EXPECT_EQ(vtu_array<double>(vtu, "velocity")[47], 1.0);
+  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "fixed")[0], 7);
+  const auto masters = vtu_array<std::int32_t>(vtu, "masters");
+  ASSERT_EQ(masters.size(), 64u);
+  EXPECT_EQ(std::vector<std::int32_t>(masters.begin() + 12, masters.begin() + 16),
+            (std::vector<std::int32_t>{0, 1, -1, -1}));
+  // VTK numbers the corners of a hexahedron around the bottom, then around the top.
+  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "connectivity"),
+            (std::vector<std::int32_t>{0, 1, 3, 2, 4, 5, 7, 6, 8, 9, 11, 10, 12, 13, 15, 14}));
+  EXPECT_EQ(vtu_array<std::int64_t>(vtu, "offsets"), (std::vector<std::int64_t>{8, 16}));
+  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "types"), (std::vector<std::uint8_t>{12, 12}));
+  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "level"), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "piece"), (std::vector<std::int32_t>{0, 1}));
+  EXPECT_EQ(vtu_array<double>(vtu, "youngs_modulus"), (std::vector<double>{1e4, 1e4 + 1}));
+  EXPECT_EQ(vtu_array<double>(vtu, "poissons_ratio")[1], 0.4);
+  EXPECT_EQ(vtu_array<double>(vtu, "density")[0], 1000);
+  const auto rotation = vtu_array<double>(vtu, "rotation");
+  ASSERT_EQ(rotation.size(), 18u);
+  EXPECT_EQ(rotation[13], 1.0);
+}
+
+TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
+  Summary summary;
+  summary.cells = 8;
+  summary.bytes = 64;
+  summary.state_hash = 0xabcULL;
+  summary.level_cells = {8, 1};
+  summary.level_vertices = {27, 8};
+  summary.seconds = {{"solve", 1.5}};
+  summary.warnings = {"w"};
+  StepReport step;
+  step.step = 1;
+  step.cycles = 9;
+  step.residual = std::numeric_limits<double>::quiet_NaN();
+  CutEvent event;
+  event.cut_id = 1;
+  event.links_hit = 4;
+  event.disconnected = {1, 2, 3};
+  step.cuts = {event};
+  summary.steps = {step};
+
+  const auto json = nlohmann::json::parse(to_json(summary));
+
+  for (const char* key :
+       {"scene", "cells", "cells_before_cuts", "vertices", "unknowns", "hanging", "levels", "pieces",
+        "seconds", "steps", "peak_bytes", "bytes_per_cell", "backend", "threads", "precision",
+        "version", "commit", "state_hash", "links_cut", "warnings"})
+    EXPECT_TRUE(json.contains(key)) << key;
+  EXPECT_EQ(json["state_hash"], "0000000000000abc");
+  EXPECT_EQ(json["levels"], 2);
+  EXPECT_EQ(json["bytes_per_cell"], 8.0);
+  EXPECT_EQ(json["seconds"]["solve"], 1.5);
+  EXPECT_EQ(json["steps"][0]["cycles"], 9);
+  EXPECT_TRUE(json["steps"][0]["residual"].is_null()) << "not a number has no place in JSON";
+  EXPECT_EQ(json["steps"][0]["cuts"][0]["links_cut"], 3);
+  EXPECT_FALSE(json["version"].get<std::string>().empty());
+}
+
+TEST_F(ResultsTest, CommitGivesNamesAndTheSeries) {
+  const fs::path out = root_ / "a" / "b";
+  {
+    ResultsFolder results(out, {});
+    results.add_snapshot(0, 0.0, two_cut_cells());
+    results.add_snapshot(12, 0.25, two_cut_cells());
+    for (const auto& name : names(out)) EXPECT_EQ(name.front(), '.') << "not finished: " << name;
+    results.commit({});
+  }
+  EXPECT_EQ(names(out), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0012.vtu",
+                                                  "summary.json"}));
+  const std::string pvd = read_all(out / "body.pvd");
+  EXPECT_NE(pvd.find("timestep=\"0.25\" part=\"0\" file=\"body_0012.vtu\""), std::string::npos);
+}
+
+TEST_F(ResultsTest, WithoutCommitNothingRemains) {
+  const fs::path out = root_ / "a" / "b";
+  { ResultsFolder(out, {}).add_snapshot(0, 0.0, two_cut_cells()); }
+  EXPECT_TRUE(names(root_).empty()) << "folders that were created go too";
+
+  touch(root_ / "mine.txt");
+  { ResultsFolder(root_, {}).add_snapshot(0, 0.0, two_cut_cells()); }
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"mine.txt"}));
+}
+
+TEST_F(ResultsTest, WithoutCommitAnEarlierRunStays) {
+  ResultsFolder(root_, {}).commit({});
+  touch(root_ / "body_0001.vtu");
+  const auto before = names(root_);
+  { ResultsFolder(root_, {}).add_snapshot(1, 0.0, two_cut_cells()); }
+  EXPECT_EQ(names(root_), before);
+  EXPECT_EQ(read_all(root_ / "body_0001.vtu"), "x");
+}
+
+TEST_F(ResultsTest, StaleFilesOfOursGoOthersStay) {
+  for (const char* name : {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "body_x.vtu",
+                           "my_body_0001.vtu", "notes.txt", "body_12.vtu"})
+    touch(root_ / name);
+  ResultsFolder results(root_, {});
+  results.add_snapshot(0, 0.0, two_cut_cells());
+  results.commit({});
+  EXPECT_EQ(names(root_),
+            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_12.vtu", "body_x.vtu",
+                                      "my_body_0001.vtu", "notes.txt", "summary.json"}));
+}
+
+TEST_F(ResultsTest, FileInPlaceOfTheFolderIsAnError) {
+  touch(root_ / "taken");
+  for (const fs::path& path : {root_ / "taken", root_ / "taken" / "inner"}) {
+    try {
+      ResultsFolder results(path, {});
+      FAIL() << path;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+      EXPECT_NE(std::string(error.what()).find(path.string()), std::string::npos);
+    }
+  }
+}
+
+TEST(PreviewSurface, FacesPointOutwardAndKeepTheirCut) {
+  const Snapshot s = two_cut_cells();
+  const PreviewSurface surface = preview_surface(s);
+  ASSERT_EQ(surface.quads.size(), 12u);
+  for (std::size_t q = 0; q < 12; ++q) {
+    const auto& quad = surface.quads[q];
+    const Vec3d area = cross(surface.points[quad[2]] - surface.points[quad[0]],
+                             surface.points[quad[3]] - surface.points[quad[1]]);
+    const auto& face = s.boundary[q];
+    Vec3d outward;
+    outward[face.face / 2] = face.face % 2 == 1 ? 1 : -1;
+    EXPECT_GT(dot(area, outward), 0) << "face " << face.face << " of cell " << face.cell;
+    EXPECT_EQ(surface.cut_id[q], face.cut_id);
+    for (const auto n : surface.normal_of[q]) EXPECT_GT(dot(surface.normals[n], outward), 0);
+  }
+}
+
+TEST(PreviewSurface, SmoothingMovesAPointByHalfACellAtMost) {
+  const Snapshot s = two_cut_cells();
+  const PreviewSurface surface = preview_surface(s);
+  ASSERT_EQ(surface.points.size(), s.points.size());
+  Box3 before, after;
+  for (std::size_t i = 0; i < s.points.size(); ++i) before.add(s.points[i] + s.displacement[i]);
+  for (const auto& p : surface.points) after.add(p);
+  const double limit = 0.5 * surface.cell + 1e-12;  // rounding
+  EXPECT_LE(norm(before.lo - after.lo), 1.7320508075688773 * limit);
+  EXPECT_LE(norm(before.hi - after.hi), 1.7320508075688773 * limit);
+}
+
+TEST_F(ResultsTest, PreviewIsAPictureAndTheSameEachTime) {
+  if (!can_draw_preview()) GTEST_SKIP() << "built without Embree or libpng";
+  PreviewOptions options;
+  options.width = 80;
+  options.height = 60;
+  draw_preview(root_ / "a.png", two_cut_cells(), options);
+  draw_preview(root_ / "b.png", two_cut_cells(), options);
+  const std::string a = read_all(root_ / "a.png");
+  ASSERT_GT(a.size(), 100u);
+  EXPECT_EQ(a.substr(1, 3), "PNG");
+  EXPECT_EQ(a, read_all(root_ / "b.png"));
+}
+
+TEST(Progress, LineFitsAndSaysWhatCounts) {
+  ProgressState state;
+  state.step = 5;
+  state.steps = 10;
+  state.time = 0.1;
+  state.seconds_per_step = 0.5;
+  state.cycles = 12;
+  state.residual = 3e-7;
+  state.seconds_left = 125;
+  const std::string line = progress_line(state, 200);
+  for (const char* part : {"[##########----------]", "5/10", "0.50 s/step", "12 cycles", "3.0e-07",
+                           "2:05 min left"})
+    EXPECT_NE(line.find(part), std::string::npos) << part << " not in " << line;
+  EXPECT_EQ(progress_line(state, 30).size(), 30u);
+}
+
+}  // namespace
+}  // namespace kerf
