@@ -18,7 +18,8 @@ class Places {
     std::int32_t next = 8 * cells;
     for (const CellLink& link : level.links) {
       if (level.size_log2[link.a] == level.size_log2[link.b]) continue;
-      const std::int32_t large = level.size_log2[link.a] > level.size_log2[link.b] ? link.a : link.b;
+      const std::int32_t large =
+          level.size_log2[link.a] > level.size_log2[link.b] ? link.a : link.b;
       if (half_[large] < 0) {
         half_[large] = next;
         next += 27;
@@ -182,9 +183,9 @@ void check_masters(const Level& level, const Places& places, UnionFind& sets,
         for (int d = 0; d < 3; ++d)
           q[d] = level.corner[cell][d] + (((j >> d) & 1) * 2 - ((octant >> d) & 1)) * size;
         const std::int32_t place = places.at(master, q);
-        ensures(place < 8 * level.cells() &&
-                    component[sets.find(place)].vertex == level.slots[cell][j],
-                "a cell depends on more than eight vertices");
+        ensures(
+            place < 8 * level.cells() && component[sets.find(place)].vertex == level.slots[cell][j],
+            "a cell depends on more than eight vertices");
         if (sub == 0) break;
       }
     }
@@ -203,11 +204,20 @@ void fill_incidences(Level& level) {
     for (int i = 0; i < 8; ++i) level.incidence[next[level.slots[cell][i]]++] = 8 * cell + i;
 }
 
-// Greedy in vertex order: eight colours on a uniform grid, some more at level jumps.
-void colour_vertices(Level& level) {
+// Where all cells have one size, the parity of the grid point: eight colours, however many vertices
+// share a place.
+std::vector<std::uint8_t> colours_by_parity(const Level& level) {
+  std::vector<std::uint8_t> colour(level.point.size());
+  for (std::size_t v = 0; v < colour.size(); ++v)
+    for (int d = 0; d < 3; ++d)
+      colour[v] |= static_cast<std::uint8_t>(((level.point[v][d] >> level.size_log2[0]) & 1) << d);
+  return colour;
+}
+
+// Greedy in vertex order: somewhat more than eight at level jumps.
+std::vector<std::uint8_t> colours_by_greed(const Level& level) {
   constexpr int kMaxColours = 128;
   std::vector<std::uint8_t> colour(level.point.size(), kMaxColours);
-  std::vector<std::int32_t> count;
   for (std::int32_t v = 0; v < level.vertices(); ++v) {
     std::uint64_t used[2] = {0, 0};
     for (std::int32_t k = level.incidence_begin[v]; k < level.incidence_begin[v + 1]; ++k)
@@ -217,9 +227,17 @@ void colour_vertices(Level& level) {
     if (c == 64) c = 64 + std::countr_one(used[1]);
     ensures(c < kMaxColours, "more than 128 colours");
     colour[v] = static_cast<std::uint8_t>(c);
-    if (c >= static_cast<int>(count.size())) count.resize(c + 1, 0);
-    ++count[c];
   }
+  return colour;
+}
+
+void colour_vertices(Level& level) {
+  const bool one_size = level.size_log2.front() == level.size_log2.back();
+  const std::vector<std::uint8_t> colour =
+      one_size ? colours_by_parity(level) : colours_by_greed(level);
+  std::vector<std::int32_t> count(*std::max_element(colour.begin(), colour.end()) + std::size_t{1},
+                                  0);
+  for (const std::uint8_t c : colour) ++count[c];
   level.colour_begin.assign(count.size() + 1, 0);
   for (std::size_t c = 0; c < count.size(); ++c)
     level.colour_begin[c + 1] = level.colour_begin[c] + count[c];
