@@ -35,7 +35,10 @@ SolverSetup solver(CycleType cycle, SmootherType smoother, double omega = 1.0) {
 }
 
 const char* name(CycleType type) {
-  return type == CycleType::v ? "V" : type == CycleType::w ? "W" : type == CycleType::k ? "K" : "auto";
+  return type == CycleType::v   ? "V"
+         : type == CycleType::w ? "W"
+         : type == CycleType::k ? "K"
+                                : "auto";
 }
 
 std::string count(int iterations) { return iterations < 0 ? "-" : std::to_string(iterations); }
@@ -47,8 +50,11 @@ std::string levels_of(const Convergence& c) {
 }
 
 void head(const char* title, const char* first) {
-  std::printf("\n### %s\n\n| %s | factor | CG 1e-6 | CG 1e-10 | three cycles | ms a cycle | vertices by level |\n"
-              "|---|---|---|---|---|---|---|\n", title, first);
+  std::printf(
+      "\n### %s\n\n| %s | factor | CG 1e-6 | CG 1e-10 | three cycles | ms a cycle | vertices by "
+      "level |\n"
+      "|---|---|---|---|---|---|---|\n",
+      title, first);
 }
 
 void row(const std::string& first, const ProblemSetup& setup) {
@@ -84,7 +90,8 @@ void omega() {
 }
 
 void combs() {
-  head("Duplicated cells against merging by place: comb cut, 32^3, nu 0.3", "comb, mass, hierarchy, cycle");
+  head("Duplicated cells against merging by place: comb cut, 32^3, nu 0.3",
+       "comb, mass, hierarchy, cycle");
   for (const bool rotated : {false, true})
     for (const double courant : {0.0, 1.0})
       for (const bool duplicate : {true, false})
@@ -138,12 +145,17 @@ int main(int argc, char** argv) {
   const struct {
     const char* name;
     void (*run)();
-  } sections[] = {{"cube", cube}, {"omega", omega}, {"comb", combs}, {"levels", by_levels}, {"rotated", rotated}};
+  } sections[] = {{"cube", cube},
+                  {"omega", omega},
+                  {"comb", combs},
+                  {"levels", by_levels},
+                  {"rotated", rotated}};
   for (int i = 1; i < argc; ++i) {
     bool known = false;
     for (const auto& section : sections) known = known || std::strcmp(argv[i], section.name) == 0;
     if (known) continue;
-    std::fprintf(stderr, "kerf_convergence: no table '%s'; there are: cube omega comb levels rotated\n",
+    std::fprintf(stderr,
+                 "kerf_convergence: no table '%s'; there are: cube omega comb levels rotated\n",
                  argv[i]);
     return 2;
   }

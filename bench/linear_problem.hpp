@@ -13,7 +13,7 @@
 namespace kerf::bench {
 
 struct ProblemSetup {
-  int cells = 32;                    ///< along an edge of the unit cube
+  int cells = 32;  ///< along an edge of the unit cube
   int refinement = 0;
   double poisson = 0.3;
   std::vector<TriangleMesh> blades;  ///< applied in the reference state
@@ -23,9 +23,9 @@ struct ProblemSetup {
 
 /// What one cycle and CG with it do to the error.
 struct Convergence {
-  double factor = 0;            ///< asymptotic factor of one cycle alone, in the 2-norm of the error
+  double factor = 0;  ///< asymptotic factor of one cycle alone, in the 2-norm of the error
   int cg_1e6 = -1, cg_1e10 = -1;  ///< iterations until the error is below; -1: not within the limit
-  double three_cycles = 0;      ///< error left after three cycles from zero
+  double three_cycles = 0;        ///< error left after three cycles from zero
   double seconds_per_cycle = 0;
   std::vector<std::int32_t> vertices;  ///< of each level
 };

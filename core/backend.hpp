@@ -16,12 +16,12 @@ namespace kerf {
 
 /// Vectors that every level has. Level 0 has more: `Backend::add_vector`.
 enum VectorId : int {
-  kSolution,    ///< u of A u = f
-  kRight,       ///< f
-  kResidual,    ///< f - A u
-  kDirection,   ///< of the Chebyshev recursion
-  kScratch,     ///< product of the Chebyshev recursion and of the Krylov methods
-  kKrylovX,     ///< two vectors of the K-cycle, and conjugate gradients on level 0
+  kSolution,   ///< u of A u = f
+  kRight,      ///< f
+  kResidual,   ///< f - A u
+  kDirection,  ///< of the Chebyshev recursion
+  kScratch,    ///< product of the Chebyshev recursion and of the Krylov methods
+  kKrylovX,    ///< two vectors of the K-cycle, and conjugate gradients on level 0
   kKrylovV,
   kLevelVectors
 };
@@ -36,9 +36,9 @@ struct OperatorScale {
 
 struct SmootherOptions {
   bool chebyshev = true;
-  double omega = 1.0;          ///< Gauss-Seidel
-  int degree = 2;              ///< Chebyshev steps in one sweep
-  double smallest = 1.0 / 8;   ///< Chebyshev: lower end of the range, relative to the upper
+  double omega = 1.0;         ///< Gauss-Seidel
+  int degree = 2;             ///< Chebyshev steps in one sweep
+  double smallest = 1.0 / 8;  ///< Chebyshev: lower end of the range, relative to the upper
 };
 
 /// Holds one simulation's matrices and vectors and runs the loops over them.
@@ -67,9 +67,9 @@ class Backend {
   /// R of every cell of level 0 as a unit quaternion, four doubles a cell: w x y z.
   virtual void read_rotations(std::span<double> out) const = 0;
   virtual void write_rotations(std::span<const double> in) = 0;
-  virtual void coarsen(int fine) = 0;     ///< matrices of fine + 1 from fine
-  virtual void prepare(int level) = 0;    ///< diagonal blocks, and the bound for Chebyshev
-  virtual void factor_coarsest() = 0;     ///< throws Error (bad_input) if a piece is not held
+  virtual void coarsen(int fine) = 0;   ///< matrices of fine + 1 from fine
+  virtual void prepare(int level) = 0;  ///< diagonal blocks, and the bound for Chebyshev
+  virtual void factor_coarsest() = 0;   ///< throws Error (bad_input) if a piece is not held
   /// Lower triangle of the matrix of a cell over its slots, 300 doubles (kernels/layout.hpp).
   virtual void read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const = 0;
   /// Upper end of the smoother's range: an estimate from above of max eig(D^-1 A).
@@ -77,11 +77,11 @@ class Backend {
 
   // The cycle.
   virtual void smooth(int level, SweepOrder order, int count) = 0;  ///< u from f
-  virtual double residual(int level) = 0;            ///< r = f - A u; returns |r|
-  virtual void restrict_residual(int fine) = 0;      ///< f of fine + 1 = P^T r; its u = 0
-  virtual void prolong_correction(int fine) = 0;     ///< u of fine += P u of fine + 1
-  virtual void solve_coarsest() = 0;                 ///< u from f
-  virtual void apply(int level, int in, int out) = 0;             ///< out = A in
+  virtual double residual(int level) = 0;                           ///< r = f - A u; returns |r|
+  virtual void restrict_residual(int fine) = 0;        ///< f of fine + 1 = P^T r; its u = 0
+  virtual void prolong_correction(int fine) = 0;       ///< u of fine += P u of fine + 1
+  virtual void solve_coarsest() = 0;                   ///< u from f
+  virtual void apply(int level, int in, int out) = 0;  ///< out = A in
   virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
 
   // Forces, level 0.
@@ -93,7 +93,7 @@ class Backend {
   // Vectors.
   virtual void zero(int level, int x) = 0;
   virtual void copy(int level, int from, int to) = 0;
-  virtual void add(int level, double a, int x, int y) = 0;               ///< y += a x
+  virtual void add(int level, double a, int x, int y) = 0;                ///< y += a x
   virtual void combine(int level, double a, int x, double b, int y) = 0;  ///< y = a x + b y
   virtual double dot(int level, int x, int y) = 0;
   virtual void mask(int level, int x) = 0;  ///< zero in fixed components

@@ -63,8 +63,8 @@ std::vector<DueCut> CutSchedule::due(int step) const {
     const double t0 = std::clamp((from - cut.start) / length, 0.0, 1.0);
     const double t1 = std::clamp((to - cut.start) / length, 0.0, 1.0);
     if (t1 - t0 > kSlack)
-      out.push_back({sweep_between(cut.lines, t0, t1), cut.deformed,
-                     static_cast<std::int32_t>(i) + 1});
+      out.push_back(
+          {sweep_between(cut.lines, t0, t1), cut.deformed, static_cast<std::int32_t>(i) + 1});
   }
   return out;
 }

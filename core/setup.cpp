@@ -16,7 +16,8 @@ void validate_material(const Material& m, const std::string& where) {
   expects(m.young > 0 && std::isfinite(m.young), where + ".young must be positive, in Pa");
   expects(m.poisson > -1 && m.poisson < 0.5,
           where + ".poisson must lie between -1 and 0.5, both excluded");
-  expects(m.density > 0 && std::isfinite(m.density), where + ".density must be positive, in kg/m^3");
+  expects(m.density > 0 && std::isfinite(m.density),
+          where + ".density must be positive, in kg/m^3");
   expects(m.mass_damping >= 0 && m.stiffness_damping >= 0 && std::isfinite(m.mass_damping) &&
               std::isfinite(m.stiffness_damping),
           where + ".damping must not be negative");
@@ -27,7 +28,8 @@ void validate_cut(const CutSetup& cut, const std::string& where) {
           where + " has no blade: give lines or a mesh");
   expects(cut.start >= 0 && std::isfinite(cut.start), where + ".start must not be negative, in s");
   if (cut.end) {
-    expects(*cut.end > cut.start && std::isfinite(*cut.end), where + ".end must be after its start");
+    expects(*cut.end > cut.start && std::isfinite(*cut.end),
+            where + ".end must be after its start");
     expects(!cut.lines.empty(), where + ": a blade from a mesh cuts at once; leave out end");
   }
   if (cut.lines.empty()) {
@@ -67,7 +69,8 @@ void validate(const SimulationSetup& setup) {
   for (std::size_t i = 0; i < setup.cuts.size(); ++i) validate_cut(setup.cuts[i], text("cut ", i));
   const TimeSetup& time = setup.time;
   expects(time.step > 0 && std::isfinite(time.step), "time.step must be positive, in s");
-  expects(time.duration > 0 && std::isfinite(time.duration), "time.duration must be positive, in s");
+  expects(time.duration > 0 && std::isfinite(time.duration),
+          "time.duration must be positive, in s");
   expects(time.duration / time.step < 1e9, "time.duration asks for more than 10^9 steps");
   expects(time.nonlinear_tolerance > 0 && time.nonlinear_iterations >= 1,
           "time.tolerance must be positive and time.max_iterations at least 1");
@@ -78,7 +81,8 @@ void validate(const SimulationSetup& setup) {
   expects(solver.pre_sweeps >= 0 && solver.post_sweeps >= 0 &&
               solver.pre_sweeps + solver.post_sweeps > 0,
           "solver.sweeps must not be negative, and one of them positive");
-  expects(solver.tolerance > 0 && solver.tolerance < 1, "solver.tolerance must lie between 0 and 1");
+  expects(solver.tolerance > 0 && solver.tolerance < 1,
+          "solver.tolerance must lie between 0 and 1");
   expects(solver.cycles >= 0 && solver.max_cycles >= 1 && solver.rotation_updates >= 1,
           "solver.cycles must not be negative; max_cycles and rotation_updates at least 1");
   expects(solver.coarsest_vertices >= 1 && solver.max_levels >= 0,

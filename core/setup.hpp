@@ -17,10 +17,10 @@
 namespace kerf {
 
 struct Material {
-  double young = 5.0e4;         ///< Pa, > 0
-  double poisson = 0.4;         ///< in (-1, 0.5)
-  double density = 1000.0;      ///< kg/m^3, > 0
-  double mass_damping = 0.0;    ///< Rayleigh alpha, 1/s, >= 0; of the whole body
+  double young = 5.0e4;            ///< Pa, > 0
+  double poisson = 0.4;            ///< in (-1, 0.5)
+  double density = 1000.0;         ///< kg/m^3, > 0
+  double mass_damping = 0.0;       ///< Rayleigh alpha, 1/s, >= 0; of the whole body
   double stiffness_damping = 0.0;  ///< Rayleigh beta, s, >= 0; of the whole body
 };
 
@@ -39,8 +39,8 @@ struct Region {
 /// Holds the vertices whose reference position lies inside `box`.
 struct Support {
   Box3 box;
-  Vec3d displacement{};                          ///< m, for the held components
-  std::array<bool, 3> held{true, true, true};    ///< which components are held
+  Vec3d displacement{};                        ///< m, for the held components
+  std::array<bool, 3> held{true, true, true};  ///< which components are held
 };
 
 struct Gravity {
@@ -61,11 +61,11 @@ struct RadialForce {
 using Load = std::variant<Gravity, BoxForce, RadialForce>;
 
 struct CutSetup {
-  double start = 0;           ///< s
-  std::optional<double> end;  ///< s; empty: the whole blade at once
-  bool deformed = true;       ///< tested in the deformed state; else in the reference state
-  std::vector<CutLine> lines; ///< successive positions of the edge; or
-  TriangleMesh mesh;          ///< a blade at rest, cut at once; used when lines is empty
+  double start = 0;            ///< s
+  std::optional<double> end;   ///< s; empty: the whole blade at once
+  bool deformed = true;        ///< tested in the deformed state; else in the reference state
+  std::vector<CutLine> lines;  ///< successive positions of the edge; or
+  TriangleMesh mesh;           ///< a blade at rest, cut at once; used when lines is empty
 };
 
 enum class TimeMode { dynamic, statics };
@@ -74,8 +74,8 @@ enum class TimeScheme { newmark, central };
 struct TimeSetup {
   TimeMode mode = TimeMode::dynamic;
   TimeScheme scheme = TimeScheme::newmark;
-  double step = 0.02;      ///< s, > 0
-  double duration = 1.0;   ///< s, > 0
+  double step = 0.02;     ///< s, > 0
+  double duration = 1.0;  ///< s, > 0
   bool lumped_mass = false;
   double nonlinear_tolerance = 1e-8;  ///< static mode: relative residual of the equilibrium
   int nonlinear_iterations = 200;     ///< static mode: rotation updates before giving up
@@ -91,17 +91,17 @@ struct SolverSetup {
   CycleType cycle = CycleType::automatic;
   SmootherType smoother = SmootherType::chebyshev;
   int pre_sweeps = 1, post_sweeps = 1;
-  double omega = 1.0;               ///< over-relaxation of Gauss-Seidel, in (0, 2)
-  double tolerance = 1e-6;          ///< true relative residual of each linear solve
-  int cycles = 0;                   ///< > 0: this fixed number instead of the tolerance
+  double omega = 1.0;       ///< over-relaxation of Gauss-Seidel, in (0, 2)
+  double tolerance = 1e-6;  ///< true relative residual of each linear solve
+  int cycles = 0;           ///< > 0: this fixed number instead of the tolerance
   int max_cycles = 500;
-  int rotation_updates = 2;         ///< a dynamic step
-  int coarsest_vertices = 1500;     ///< direct solve at the first level with at most so many
-  int max_levels = 0;               ///< 0: no limit
-  bool duplicate_cells = true;      ///< false: merge by place only (for comparison)
+  int rotation_updates = 2;      ///< a dynamic step
+  int coarsest_vertices = 1500;  ///< direct solve at the first level with at most so many
+  int max_levels = 0;            ///< 0: no limit
+  bool duplicate_cells = true;   ///< false: merge by place only (for comparison)
   Precision precision = Precision::double_;
-  std::string backend = "cpu";      ///< cpu, cuda, auto
-  int threads = 0;                  ///< 0: all
+  std::string backend = "cpu";  ///< cpu, cuda, auto
+  int threads = 0;              ///< 0: all
 };
 
 struct SimulationSetup {

@@ -92,11 +92,10 @@ void Simulation::Impl::start() {
   state.memory = backend->add_vector();
   state.external = backend->add_vector();
   if (setup.time.mode == TimeMode::dynamic)
-    motion = std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver,
-                                      state);
+    motion =
+        std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver, state);
   else
-    equilibrium =
-        std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
+    equilibrium = std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
   build_structure();
   cells_before = hierarchy.values.size();
   load_structure();
@@ -165,11 +164,11 @@ void Simulation::Impl::check_memory() const {
   }
   const double available = static_cast<double>(physical_memory());
   if (bytes < 0.9 * available) return;
-  throw Error(ErrorKind::unavailable,
-              text("this body of ", hierarchy.values.size(), " cells needs about ",
-                   std::ceil(bytes / 1e8) / 10, " GB for its matrices and vectors; this machine has ",
-                   std::floor(available / 1e8) / 10,
-                   " GB; lower body.resolution or raise body.refinement"));
+  throw Error(ErrorKind::unavailable, text("this body of ", hierarchy.values.size(),
+                                           " cells needs about ", std::ceil(bytes / 1e8) / 10,
+                                           " GB for its matrices and vectors; this machine has ",
+                                           std::floor(available / 1e8) / 10,
+                                           " GB; lower body.resolution or raise body.refinement"));
 }
 
 void Simulation::Impl::check_held() const {
@@ -187,10 +186,11 @@ void Simulation::Impl::check_held() const {
     const Vec3d at = body.lattice().point(level.corner[example[p]]);
     throw Error(
         ErrorKind::bad_input,
-        text("static mode: piece ", p, " of ", pieces, " (", size[p], " cells, near x = ", at.x,
-             ", y = ", at.y, ", z = ", at.z,
-             " m) is held by no support, so it has no equilibrium; hold it with a [[support]], keep "
-             "the cut from separating it, or use time.mode = \"dynamic\""));
+        text(
+            "static mode: piece ", p, " of ", pieces, " (", size[p], " cells, near x = ", at.x,
+            ", y = ", at.y, ", z = ", at.z,
+            " m) is held by no support, so it has no equilibrium; hold it with a [[support]], keep "
+            "the cut from separating it, or use time.mode = \"dynamic\""));
   }
 }
 
@@ -352,18 +352,17 @@ PhaseTimes Simulation::seconds() const {
 }
 
 Snapshot Simulation::snapshot() const {
-  Snapshot out = make_snapshot(impl_->body, impl_->hierarchy,
-                               impl_->read_vector(impl_->state.displacement),
-                               impl_->read_vector(impl_->state.velocity),
-                               impl_->read_vector(impl_->state.external));
+  Snapshot out = make_snapshot(
+      impl_->body, impl_->hierarchy, impl_->read_vector(impl_->state.displacement),
+      impl_->read_vector(impl_->state.velocity), impl_->read_vector(impl_->state.external));
   out.piece = impl_->piece;
   const Level& level = impl_->hierarchy.levels[0];
   std::vector<double> rotations(4 * impl_->hierarchy.values.size());
   impl_->backend->read_rotations(rotations);
   for (std::int32_t c = 0; c < level.cells(); ++c) {
     const std::uint8_t index = impl_->hierarchy.values[c].material;
-    const Material& material = index == 0 ? impl_->setup.material
-                                          : impl_->setup.regions[index - std::size_t{1}].material;
+    const Material& material =
+        index == 0 ? impl_->setup.material : impl_->setup.regions[index - std::size_t{1}].material;
     out.young.push_back(material.young);
     out.poisson.push_back(material.poisson);
     out.density.push_back(material.density);

@@ -28,7 +28,7 @@ namespace kerf {
 /// One finished step (dynamic) or equilibrium (static).
 struct StepReport {
   int step = 0;
-  double time = 0;             ///< s, at the end of the step
+  double time = 0;  ///< s, at the end of the step
   int rotation_updates = 0;
   int cycles = 0;              ///< multigrid cycles or CG iterations, all linear solves together
   double linear_residual = 0;  ///< largest true relative residual of its linear solves
@@ -45,13 +45,14 @@ using PhaseTimes = std::vector<std::pair<std::string, double>>;
 
 /// The state in one flat picture for files: points are vertices first, then hanging corners.
 struct Snapshot {
-  std::vector<Vec3d> points;         ///< reference positions, m
+  std::vector<Vec3d> points;                                  ///< reference positions, m
   std::vector<Vec3d> displacement, velocity, external_force;  ///< m, m/s, N; force 0 at hanging
-  std::vector<std::uint8_t> fixed;   ///< bit per held component
-  std::vector<std::array<std::int32_t, 4>> masters;  ///< of a hanging corner; else all -1; a
-                                     ///< corner in mid-edge has two masters and twice -1
-  std::vector<std::array<std::int32_t, 8>> cells;    ///< points, corner x + 2y + 4z
-  std::vector<std::uint8_t> size_log2;               ///< 0: a finest cell
+  std::vector<std::uint8_t> fixed;                            ///< bit per held component
+  std::vector<std::array<std::int32_t, 4>>
+      masters;  ///< of a hanging corner; else all -1; a
+                ///< corner in mid-edge has two masters and twice -1
+  std::vector<std::array<std::int32_t, 8>> cells;  ///< points, corner x + 2y + 4z
+  std::vector<std::uint8_t> size_log2;             ///< 0: a finest cell
   std::vector<std::int32_t> piece;
   std::vector<double> young, poisson, density;
   std::vector<Mat3d> rotation;
@@ -92,8 +93,8 @@ class Simulation {
   std::size_t cells() const;
   std::size_t cells_before_cuts() const;
   std::size_t vertices() const;
-  std::size_t unknowns() const;   ///< free components
-  std::size_t hanging() const;    ///< hanging corners, each place once
+  std::size_t unknowns() const;  ///< free components
+  std::size_t hanging() const;   ///< hanging corners, each place once
   std::size_t pieces() const;
   std::size_t links_cut() const;  ///< by blades, so far
   std::size_t bytes() const;      ///< held by body, hierarchy and backend

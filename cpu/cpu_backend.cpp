@@ -16,7 +16,6 @@
 #include "core/solve/sparse_cholesky.hpp"
 #include "core/solve/spectrum.hpp"
 #include "cpu/level_store.hpp"
-
 #include "kernels/coarsen.hpp"
 #include "kernels/relax.hpp"
 #include "kernels/rotation.hpp"
@@ -74,13 +73,16 @@ class CpuBackend final : public Backend {
   void read(int level, int x, std::span<double> values) const override;
 
  private:
-  // Calls body(i) for i in [0, count), the range cut into one slab a thread.
+  // Calls body(i) for i in [0, count), the range cut into one slab a thread. Below `worth` items,
+  // waking the threads costs more than the loop, and far more on a machine with other work.
   template <class Body>
-  void parallel(std::int32_t count, const Body& body) const {
-    constexpr std::int32_t kWorthThreads = 512;  // below, starting threads costs more than the loop
-#pragma omp parallel for num_threads(threads_) schedule(static) if (count >= kWorthThreads)
+  void parallel(std::int32_t count, const Body& body, std::int32_t worth = kWorthCells) const {
+#pragma omp parallel for num_threads(threads_) schedule(static) if (count >= worth)
     for (std::int32_t i = 0; i < count; ++i) body(i);
   }
+  static constexpr std::int32_t kWorthCells = 512;      // hundreds of operations an item
+  static constexpr std::int32_t kWorthVertices = 4096;  // tens
+  static constexpr std::int32_t kWorthScalars = 65536;  // one or two
   template <class CellBody>
   void cells_to_vertices(LevelStore& store, double* out, bool masks, const CellBody& body);
   void gauss_seidel(LevelStore& store, SweepOrder order);
@@ -249,12 +251,15 @@ void CpuBackend::cells_to_vertices(LevelStore& store, double* out, bool masks,
     body(cell, f);
     std::copy_n(f, 8, store.products.begin() + 8 * static_cast<std::ptrdiff_t>(cell));
   });
-  parallel(store.vertices(), [&](std::int32_t v) {
-    Vec sum{};
-    for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-      sum += store.products[l.incidence[k]];
-    cpu::store(out, v, masks ? masked(sum, l.fixed[v]) : sum);
-  });
+  parallel(
+      store.vertices(),
+      [&](std::int32_t v) {
+        Vec sum{};
+        for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
+          sum += store.products[l.incidence[k]];
+        cpu::store(out, v, masks ? masked(sum, l.fixed[v]) : sum);
+      },
+      kWorthVertices);
 }
 
 void CpuBackend::apply(int level, int in, int out) {
@@ -286,9 +291,8 @@ void CpuBackend::elastic_force(int displacement, int out) {
     kernels::unfold(at, store.level->fold[cell], corners);
     const CellValues& values = hierarchy_->values[cell];
     const double side = finest_.spacing * (1 << store.level->size_log2[cell]);
-    kernels::elastic_force(corners, kernels::to_matrix(finest_.rotation[cell]), side,
-                           values.stiffness, finest_.materials[values.material].modes.stiffness,
-                           corners);
+    kernels::elastic_force(corners, finest_.rotation[cell], side, values.stiffness,
+                           finest_.materials[values.material].modes.stiffness, corners);
     kernels::fold_transpose(corners, store.level->fold[cell], f);
   });
 }
@@ -342,13 +346,16 @@ void CpuBackend::chebyshev(LevelStore& store, int level) {
     const double next = step == 0 ? rho : 1 / (2 * sigma - rho);
     const double keep = step == 0 ? 0 : next * rho, take = step == 0 ? 1 / theta : 2 * next / delta;
     rho = next;
-    parallel(store.vertices(), [&](std::int32_t v) {
-      const Vec z = store.inverse_diagonal[v] * cpu::load(r, v);
-      Vec direction = take * z;
-      if (step > 0) direction += keep * cpu::load(d, v);
-      cpu::store(d, v, direction);
-      cpu::store(u, v, cpu::load(u, v) + direction);
-    });
+    parallel(
+        store.vertices(),
+        [&](std::int32_t v) {
+          const Vec z = store.inverse_diagonal[v] * cpu::load(r, v);
+          Vec direction = take * z;
+          if (step > 0) direction += keep * cpu::load(d, v);
+          cpu::store(d, v, direction);
+          cpu::store(u, v, cpu::load(u, v) + direction);
+        },
+        kWorthVertices);
   }
 }
 
@@ -375,12 +382,15 @@ void CpuBackend::restrict_residual(int fine) {
     std::copy_n(sum, 8, to.products.begin() + 8 * static_cast<std::ptrdiff_t>(cell));
   });
   double* out = data(fine + 1, kRight);
-  parallel(to.vertices(), [&](std::int32_t v) {
-    Vec sum{};
-    for (std::int32_t k = c.incidence_begin[v]; k < c.incidence_begin[v + 1]; ++k)
-      sum += to.products[c.incidence[k]];
-    cpu::store(out, v, masked(sum, c.fixed[v]));
-  });
+  parallel(
+      to.vertices(),
+      [&](std::int32_t v) {
+        Vec sum{};
+        for (std::int32_t k = c.incidence_begin[v]; k < c.incidence_begin[v + 1]; ++k)
+          sum += to.products[c.incidence[k]];
+        cpu::store(out, v, masked(sum, c.fixed[v]));
+      },
+      kWorthVertices);
   zero(fine + 1, kSolution);
 }
 
@@ -388,16 +398,19 @@ void CpuBackend::prolong_correction(int fine) {
   const Level &f = *levels_[fine].level, &c = *levels_[fine + 1].level;
   const double* coarse = data(fine + 1, kSolution);
   double* u = data(fine, kSolution);
-  parallel(f.vertices(), [&](std::int32_t v) {
-    const std::int32_t first = f.incidence[f.incidence_begin[v]];
-    const std::int32_t child = first / 8, cell = f.parent[child];
-    double w[8][8];
-    kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);
-    Vec sum{};
-    for (int m = 0; m < 8; ++m)
-      if (w[first % 8][m] != 0) sum += w[first % 8][m] * cpu::load(coarse, c.slots[cell][m]);
-    cpu::store(u, v, cpu::load(u, v) + masked(sum, f.fixed[v]));
-  });
+  parallel(
+      f.vertices(),
+      [&](std::int32_t v) {
+        const std::int32_t first = f.incidence[f.incidence_begin[v]];
+        const std::int32_t child = first / 8, cell = f.parent[child];
+        double w[8][8];
+        kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);
+        Vec sum{};
+        for (int m = 0; m < 8; ++m)
+          if (w[first % 8][m] != 0) sum += w[first % 8][m] * cpu::load(coarse, c.slots[cell][m]);
+        cpu::store(u, v, cpu::load(u, v) + masked(sum, f.fixed[v]));
+      },
+      kWorthVertices);
 }
 
 void CpuBackend::solve_coarsest() {
@@ -409,9 +422,10 @@ void CpuBackend::precondition_jacobi(int level, int in, int out) {
   const LevelStore& store = levels_[level];
   const double* from = data(level, in);
   double* to = data(level, out);
-  parallel(store.vertices(), [&](std::int32_t v) {
-    cpu::store(to, v, store.inverse_diagonal[v] * cpu::load(from, v));
-  });
+  parallel(
+      store.vertices(),
+      [&](std::int32_t v) { cpu::store(to, v, store.inverse_diagonal[v] * cpu::load(from, v)); },
+      kWorthVertices);
 }
 
 void CpuBackend::zero(int level, int x) {
@@ -426,8 +440,9 @@ void CpuBackend::copy(int level, int from, int to) {
 void CpuBackend::combine(int level, double a, int x, double b, int y) {
   const double* from = data(level, x);
   double* to = data(level, y);
-  parallel(3 * levels_[level].vertices(),
-           [&](std::int32_t i) { to[i] = a * from[i] + b * to[i]; });
+  parallel(
+      3 * levels_[level].vertices(), [&](std::int32_t i) { to[i] = a * from[i] + b * to[i]; },
+      kWorthScalars);
 }
 
 // Fixed chunks, summed in their order: the same bits for any number of threads.
@@ -437,12 +452,15 @@ double CpuBackend::dot(int level, int x, int y) {
   const std::int32_t size = 3 * levels_[level].vertices();
   const std::int32_t chunks = (size + kChunk - 1) / kChunk;
   std::vector<double> part(chunks);
-  parallel(chunks, [&](std::int32_t chunk) {
-    double sum = 0;
-    const std::int32_t end = std::min(size, (chunk + 1) * kChunk);
-    for (std::int32_t i = chunk * kChunk; i < end; ++i) sum += a[i] * b[i];
-    part[chunk] = sum;
-  });
+  parallel(
+      chunks,
+      [&](std::int32_t chunk) {
+        double sum = 0;
+        const std::int32_t end = std::min(size, (chunk + 1) * kChunk);
+        for (std::int32_t i = chunk * kChunk; i < end; ++i) sum += a[i] * b[i];
+        part[chunk] = sum;
+      },
+      kWorthScalars / kChunk);
   double sum = 0;
   for (const double p : part) sum += p;
   return sum;
@@ -451,9 +469,10 @@ double CpuBackend::dot(int level, int x, int y) {
 void CpuBackend::mask(int level, int x) {
   double* values = data(level, x);
   const Level& l = *levels_[level].level;
-  parallel(l.vertices(), [&](std::int32_t v) {
-    cpu::store(values, v, masked(cpu::load(values, v), l.fixed[v]));
-  });
+  parallel(
+      l.vertices(),
+      [&](std::int32_t v) { cpu::store(values, v, masked(cpu::load(values, v), l.fixed[v])); },
+      kWorthVertices);
 }
 
 void CpuBackend::write(int level, int x, std::span<const double> values) {

@@ -34,8 +34,8 @@ void folded_matrix(const LevelStore& store, std::int32_t cell, double (&packed)[
 }  // namespace
 
 std::size_t LevelStore::bytes() const {
-  std::size_t sum = matrices.capacity() * sizeof(double) + inverse_diagonal.capacity() * sizeof(Sym) +
-                    products.capacity() * sizeof(Vec);
+  std::size_t sum = matrices.capacity() * sizeof(double) +
+                    inverse_diagonal.capacity() * sizeof(Sym) + products.capacity() * sizeof(Vec);
   for (const auto& vector : vectors) sum += vector.capacity() * sizeof(double);
   return sum;
 }
@@ -60,10 +60,9 @@ void finest_product(const LevelStore& store, const OperatorScale& scale, std::in
 
 void cell_product(const LevelStore& store, std::int32_t cell, const Vec (&u)[8], Vec (&f)[8]) {
   if (store.finest != nullptr) return finest_product(store, store.finest->scale, cell, u, f);
-  kernels::apply_packed(
-      kernels::cell_entries(store.matrices.data(), static_cast<std::size_t>(cell), kEntries,
-                            store.tile_log2),
-      u, f);
+  kernels::apply_packed(kernels::cell_entries(store.matrices.data(), static_cast<std::size_t>(cell),
+                                              kEntries, store.tile_log2),
+                        u, f);
 }
 
 Vec cell_row(const LevelStore& store, std::int32_t cell, int slot, const double* u) {

@@ -30,7 +30,7 @@ struct MaterialConstants {
 struct FinestStore {
   double spacing = 0;
   OperatorScale scale;
-  std::vector<Quaternion> rotation;           // per cell
+  std::vector<Quaternion> rotation;  // per cell
   std::vector<MaterialConstants> materials;
   kernels::HexMass<double> mass;
   const std::vector<CellValues>* values = nullptr;

@@ -47,8 +47,7 @@ double Equilibrium::update(double mass_factor) {
   backend_.set_operator({1, mass_factor});
   solver_.refresh();
   backend_.zero(0, increment_);
-  const SolveStats solve =
-      solver_.solve(right_, increment_, std::max(setup_.tolerance, kInner));
+  const SolveStats solve = solver_.solve(right_, increment_, std::max(setup_.tolerance, kInner));
   stats_.cycles += solve.cycles;
   stats_.linear_residual = std::max(stats_.linear_residual, solve.residual);
   ++stats_.rotation_updates;

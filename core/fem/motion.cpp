@@ -108,9 +108,8 @@ void Motion::residual(int out) {
 NonlinearStats Motion::step() {
   NonlinearStats stats;
   begin_step();
-  backend_.set_operator(
-      {1 + material_.stiffness_damping * velocity_factor(),
-       acceleration_factor() + material_.mass_damping * velocity_factor()});
+  backend_.set_operator({1 + material_.stiffness_damping * velocity_factor(),
+                         acceleration_factor() + material_.mass_damping * velocity_factor()});
   double reference = 0;
   for (int update = 0; update < setup_.rotation_updates; ++update) {
     backend_.rotate_cells(state_.displacement);

@@ -18,8 +18,8 @@ namespace kerf {
 struct StateVectors {
   int displacement = -1;  ///< m
   int velocity = -1;      ///< m/s
-  int memory = -1;        ///< Newmark: acceleration, m/s^2; central: displacement one step before, m
-  int external = -1;      ///< N
+  int memory = -1;    ///< Newmark: acceleration, m/s^2; central: displacement one step before, m
+  int external = -1;  ///< N
 };
 
 struct NonlinearStats {

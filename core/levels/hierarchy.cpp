@@ -85,11 +85,11 @@ Level merge_cells(Level& fine, int log2, bool duplicate) {
     fine.parent[c] = coarse_of[group[c]];
     int octant = 0;
     for (int d = 0; d < 3; ++d) octant |= ((fine.corner[c][d] >> log2) & 1) << d;
-    fine.place[c] =
-        fine.size_log2[c] == log2 ? static_cast<std::uint8_t>(octant) : Level::kPassed;
+    fine.place[c] = fine.size_log2[c] == log2 ? static_cast<std::uint8_t>(octant) : Level::kPassed;
     ++coarse.child_begin[fine.parent[c] + 1];
   }
-  for (std::size_t i = 0; i < entries.size(); ++i) coarse.child_begin[i + 1] += coarse.child_begin[i];
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    coarse.child_begin[i + 1] += coarse.child_begin[i];
   coarse.children.resize(fine.corner.size());
   std::vector<std::int32_t> next(coarse.child_begin.begin(), coarse.child_begin.end() - 1);
   for (std::int32_t c = 0; c < fine.cells(); ++c) coarse.children[next[fine.parent[c]]++] = c;
@@ -99,9 +99,9 @@ Level merge_cells(Level& fine, int log2, bool duplicate) {
 void sort_links(std::vector<CellLink>& links) {
   const auto key = [](const CellLink& l) { return std::tuple(l.a, l.b, l.axis); };
   std::sort(links.begin(), links.end(), [&](auto& x, auto& y) { return key(x) < key(y); });
-  links.erase(std::unique(links.begin(), links.end(),
-                          [&](auto& x, auto& y) { return key(x) == key(y); }),
-              links.end());
+  links.erase(
+      std::unique(links.begin(), links.end(), [&](auto& x, auto& y) { return key(x) == key(y); }),
+      links.end());
 }
 
 void coarsen_links(const Level& fine, Level& coarse) {
@@ -140,8 +140,7 @@ void coarsen_supports(const Level& fine, Level& coarse) {
     kernels::transfer_weights(fine.fold[c], fine.place[c], coarse.fold[parent], w);
     for (int i = 0; i < 8; ++i)
       for (int m = 0; m < 8; ++m)
-        if (w[i][m] != 0)
-          coarse.fixed[coarse.slots[parent][m]] &= fine.fixed[fine.slots[c][i]];
+        if (w[i][m] != 0) coarse.fixed[coarse.slots[parent][m]] &= fine.fixed[fine.slots[c][i]];
   }
 }
 

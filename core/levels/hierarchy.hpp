@@ -37,7 +37,7 @@ struct Level {
   std::vector<std::uint8_t> place;      ///< octant in the parent, or kPassed; empty on the coarsest
   std::vector<std::uint16_t> fold;      ///< bits 0-7 hanging corners, bits 8-10 octant
   std::vector<std::array<std::int32_t, 8>> slots;  ///< the eight vertices
-  std::vector<CellLink> links;          ///< ascending by (a, b)
+  std::vector<CellLink> links;                     ///< ascending by (a, b)
   std::vector<std::int32_t> child_begin;  ///< per cell + 1, into children; empty on level 0
   std::vector<std::int32_t> children;     ///< cells of the previous level, ascending
 
@@ -57,9 +57,9 @@ struct Level {
 
 /// What the element of a cell of level 0 needs, beside its rotation.
 struct CellValues {
-  double stiffness = 0;        ///< E * side, N/m
-  double mass = 0;             ///< density * side^3, kg
-  std::uint8_t material = 0;   ///< index into Hierarchy::poisson
+  double stiffness = 0;       ///< E * side, N/m
+  double mass = 0;            ///< density * side^3, kg
+  std::uint8_t material = 0;  ///< index into Hierarchy::poisson
 };
 
 struct HierarchyOptions {
@@ -69,12 +69,12 @@ struct HierarchyOptions {
 };
 
 struct Hierarchy {
-  double spacing = 0;                ///< side of a finest cell, m
+  double spacing = 0;  ///< side of a finest cell, m
   std::vector<Level> levels;
-  std::vector<CellValues> values;    ///< cells of level 0
-  std::vector<double> poisson;       ///< Poisson ratio of each material
+  std::vector<CellValues> values;  ///< cells of level 0
+  std::vector<double> poisson;     ///< Poisson ratio of each material
   bool lumped_mass = false;
-  bool cut = false;                  ///< some link between two cells is disconnected
+  bool cut = false;  ///< some link between two cells is disconnected
 
   std::size_t bytes() const;
 };

@@ -16,8 +16,8 @@ using SparseMap = Eigen::Map<const Eigen::SparseMatrix<double>>;
 
 SparseMap view(const AssembledLevel& m) {
   const int n = m.unknowns();
-  return {n, n, static_cast<int>(m.row.size()), m.column_begin.data(), m.row.data(),
-          m.value.data()};
+  return {
+      n, n, static_cast<int>(m.row.size()), m.column_begin.data(), m.row.data(), m.value.data()};
 }
 
 // One virtual step keeps the engines apart; both see the same assembled matrix.
