@@ -267,24 +267,32 @@ KERF_HD Quat<T> normalised(const Quat<T>& q) {
           select(usable, q.y * scale, T(0)), select(usable, q.z * scale, T(0))};
 }
 
+/// R - I, to full relative precision however small the angle.
+///
 /// Needs  |q| = 1 up to rounding.
 template <class T>
-KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
+KERF_HD Mat3<T> to_matrix_less_identity(const Quat<T>& q) {
   const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
   const T xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z;
   const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
   const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
-  Mat3<T> R;
-  R[0][0] = T(1) - yy - zz;
-  R[0][1] = xy - wz;
-  R[0][2] = xz + wy;
-  R[1][0] = xy + wz;
-  R[1][1] = T(1) - xx - zz;
-  R[1][2] = yz - wx;
-  R[2][0] = xz - wy;
-  R[2][1] = yz + wx;
-  R[2][2] = T(1) - xx - yy;
-  return R;
+  Mat3<T> D;
+  D[0][0] = -yy - zz;
+  D[0][1] = xy - wz;
+  D[0][2] = xz + wy;
+  D[1][0] = xy + wz;
+  D[1][1] = -xx - zz;
+  D[1][2] = yz - wx;
+  D[2][0] = xz - wy;
+  D[2][1] = yz + wx;
+  D[2][2] = -xx - yy;
+  return D;
+}
+
+/// Needs  |q| = 1 up to rounding.
+template <class T>
+KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
+  return Mat3<T>::identity() + to_matrix_less_identity(q);
 }
 
 }  // namespace kerf::kernels

@@ -144,19 +144,20 @@ KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffn
 
 /// f = [R] K ([R]^T (x + u) - x), the elastic force of one cell; f may be u.
 /// Translations drop out, so the rest positions x enter through the three linear modes only:
-/// x_i - centre = side/2 chi, that is 4 side in component a of mode a.
+/// x_i - centre = side/2 chi, that is 4 side in component a of mode a. They are turned by R - I, so
+/// that the strain of a stiff body, far below 1, is not what is left of the difference of two ones.
 ///
 /// Shapes  u, f: 8 corners; side in m; stiffness = E side.
 /// Source  [DGW11], section 5.
 template <class T>
-KERF_HD void elastic_force(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T side, T stiffness,
-                           const ModeStiffness<T>& k, Vec3<T> (&f)[kCorners]) {
+KERF_HD void elastic_force(const Vec3<T> (&u)[kCorners], const Quat<T>& rotation, T side,
+                           T stiffness, const ModeStiffness<T>& k, Vec3<T> (&f)[kCorners]) {
+  const Mat3<T> D = to_matrix_less_identity(rotation), R = Mat3<T>::identity() + D;
   for (int i = 0; i < kCorners; ++i) f[i] = u[i];
   to_modes(f);
   const T rest = T(4) * side;
-  for (int a = 0; a < 3; ++a) f[1 << a][a] += rest;
   for (int s = 1; s < kCorners; ++s) f[s] = transpose_times(R, f[s]);
-  for (int a = 0; a < 3; ++a) f[1 << a][a] -= rest;
+  for (int a = 0; a < 3; ++a) f[1 << a] += rest * Vec3<T>{D[a][0], D[a][1], D[a][2]};
   apply_modes(k, f);
   for (int s = 1; s < kCorners; ++s) f[s] = stiffness * (R * f[s]);
   to_corners(f);

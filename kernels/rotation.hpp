@@ -67,7 +67,9 @@ KERF_HD RotationStep<T> rotation_step(const Mat3<T>& F, const Quat<T>& q) {
   const T cyy = hxx * hzz - hxz * hxz, cyz = hxy * hxz - hxx * hyz, czz = hxx * hyy - hxy * hxy;
   const T det = hxx * cxx + hxy * cxy + hxz * cxz;
   const T trace = hxx + hyy + hzz;
-  const auto ascent = hxx > T(0) && czz > T(0) && det > kSafe * (trace * trace * trace);
+  // Near a half turn hxx and hyy can be rounding above zero, with det and trace below.
+  const auto ascent =
+      hxx > T(0) && czz > T(0) && trace > T(0) && det > kSafe * (trace * trace * trace);
   const T half = select(ascent, T(0.5) / select(ascent, det, T(1)), T(0));
   const Vec3<T> w{half * (cxx * axial.x + cxy * axial.y + cxz * axial.z),
                   half * (cxy * axial.x + cyy * axial.y + cyz * axial.z),

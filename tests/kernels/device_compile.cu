@@ -31,7 +31,7 @@ __global__ void touch_all(const Vec3<T>* displacement, Quat<T>* rotation, T* mat
 
   const ModeConstants<T> constants = mode_constants(poisson, MassModel::consistent);
   apply_cell(corners, R, side, side, constants, f);
-  elastic_force(f, R, side, side, constants.stiffness, f);
+  elastic_force(f, rotation[cell], side, side, constants.stiffness, f);
   fold_transpose(f, fold, slots);
 
   constexpr int kTileLog2 = 5;

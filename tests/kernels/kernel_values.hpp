@@ -32,6 +32,12 @@ oracle::Vector24 to_eigen(const kernels::Vec3<T> (&v)[kernels::kCorners]) {
 }
 
 template <class T>
+kernels::Quat<T> to_quat(const Eigen::Quaterniond& q) {
+  return {static_cast<T>(q.w()), static_cast<T>(q.x()), static_cast<T>(q.y()),
+          static_cast<T>(q.z())};
+}
+
+template <class T>
 kernels::Mat3<T> to_mat3(const oracle::Matrix3& a) {
   kernels::Mat3<T> out;
   for (int i = 0; i < 3; ++i)

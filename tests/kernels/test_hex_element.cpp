@@ -209,7 +209,8 @@ TEST(ElasticForce, IsZeroForAnyRigidMotion) {
       u.at[i] = {ui[0], ui[1], ui[2]};
     }
 
-    elastic_force(u.at, to_mat3<double>(R), side, stiffness, kernels::mode_stiffness(0.4), f.at);
+    elastic_force(u.at, to_quat<double>(Eigen::Quaterniond(R)), side, stiffness,
+                  kernels::mode_stiffness(0.4), f.at);
 
     EXPECT_LT(to_eigen(f.at).norm(), kRotated * stiffness * side) << degrees << " degrees";
   }
@@ -231,8 +232,8 @@ double elastic_force_error() {
     Vector24 expected;
     for (int i = 0; i < 8; ++i) expected.segment<3>(3 * i) = R * force.segment<3>(3 * i);
     CellVector<T> v = to_cell<T>(u);
-    elastic_force(v.at, to_mat3<T>(R), static_cast<T>(side), static_cast<T>(stiffness),
-                  kernels::mode_stiffness(T(0.3)), v.at);  // f may be u
+    elastic_force(v.at, to_quat<T>(Eigen::Quaterniond(R)), static_cast<T>(side),
+                  static_cast<T>(stiffness), kernels::mode_stiffness(T(0.3)), v.at);  // f may be u
     worst = std::max(worst, (to_eigen(v.at) - expected).norm() / expected.norm());
   }
   return worst;
@@ -241,6 +242,29 @@ double elastic_force_error() {
 TEST(ElasticForce, EqualsTheDenseCorotationalForce) {
   EXPECT_LT(elastic_force_error<double>(), kRotated);
   EXPECT_LT(elastic_force_error<float>(), kSingle);
+}
+
+// Steel under its own weight strains by 1e-8 and less, and equilibria are asked for to 1e-8.
+TEST(ElasticForce, KeepsItsDigitsWhereTheStrainIsTiny) {
+  Random random(16);
+  for (const double size : {1e-6, 1e-9, 1e-12}) {
+    const Vector24 u = size * random.vector24();
+    // So small an angle that R u = u but for the angle's square.
+    const kernels::Quat<double> q =
+        normalised(kernels::Quat<double>{1, size * random.normal(), size * random.normal(), 0});
+    const Vector3 turned(2 * q.x, 2 * q.y, 0);
+    const Vector24 x = oracle::corner_positions(1);
+    Vector24 strained = u;  // R^T (x + u) - x to first order
+    for (int i = 0; i < 8; ++i) strained.segment<3>(3 * i) -= turned.cross(x.segment<3>(3 * i));
+    const Vector24 expected = oracle::stiffness(0.3, 1.0) * strained;
+    CellVector<double> f = to_cell<double>(u);
+
+    elastic_force(f.at, q, 1.0, 1.0, kernels::mode_stiffness(0.3), f.at);
+
+    const double second_order = 100 * size;
+    EXPECT_LT((to_eigen(f.at) - expected).norm(), (second_order + kRotated) * expected.norm())
+        << size;
+  }
 }
 
 }  // namespace

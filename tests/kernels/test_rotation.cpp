@@ -22,12 +22,6 @@ constexpr double kProper = 1e-14;
 constexpr double kTraceSingle = 1e-5;
 constexpr double kPi = 3.14159265358979323846;
 
-template <class T>
-Quat<T> to_quat(const Eigen::Quaterniond& q) {
-  return {static_cast<T>(q.w()), static_cast<T>(q.x()), static_cast<T>(q.y()),
-          static_cast<T>(q.z())};
-}
-
 double trace_of(const Matrix3& R, const Matrix3& F) { return (R.transpose() * F).trace(); }
 
 /// How sharply the best rotation is defined: least eigenvalue of tr(S) I - S over |F|.
@@ -138,6 +132,15 @@ TEST(ExtractRotation, HoldsHalfATurnOff) {
     expect_best<double>(F, to_quat<double>(best * Eigen::AngleAxisd(kPi, axis)), kTrace);
     expect_best<double>(F, to_quat<double>(best * Eigen::Quaterniond(0, 1, 0, 0)), kTrace);
     if (HasFatalFailure()) return;
+  }
+}
+
+// The Hessian then has a determinant and a trace a rounding below zero, and a first minor above.
+TEST(ExtractRotation, HoldsHalfATurnOffAnAxisWithRoundingInTheStretch) {
+  for (const double rounding : {0.0, 4.7e-15, -4.7e-15, 1e-12}) {
+    Matrix3 F = Matrix3::Identity();
+    F(0, 0) = F(1, 1) = rounding - 1;
+    expect_best(F, Quat<double>{}, kTrace);
   }
 }
 
