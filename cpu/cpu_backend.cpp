@@ -85,10 +85,15 @@ class CpuBackend final : public Backend {
   static constexpr std::int32_t kWorthScalars = 65536;  // one or two
   template <class CellBody>
   void cells_to_vertices(LevelStore& store, double* out, bool masks, const CellBody& body);
-  void gauss_seidel(LevelStore& store, SweepOrder order);
+  void gauss_seidel(LevelStore& store, int level, SweepOrder order);
   void chebyshev(LevelStore& store, int level);
 
   double* data(int level, int x) { return levels_[level].vectors[x].data(); }
+  // Every change of a vector passes here, so that a zero solution is known as such.
+  double* changed(int level, int x) {
+    if (x == kSolution) levels_[level].solution_is_zero = false;
+    return data(level, x);
+  }
 
   int threads_;
   int tile_log2_;
@@ -129,6 +134,7 @@ void CpuBackend::load(const Hierarchy& hierarchy) {
     store.finest = l == 0 ? &finest_ : nullptr;
     store.tile_log2 = tile_log2_;
     store.bound = 0;
+    store.solution_is_zero = false;
     store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (auto& vector : store.vectors)
       vector.assign(3 * static_cast<std::size_t>(store.vertices()), 0.0);
@@ -265,7 +271,7 @@ void CpuBackend::cells_to_vertices(LevelStore& store, double* out, bool masks,
 void CpuBackend::apply(int level, int in, int out) {
   LevelStore& store = levels_[level];
   const double* u = data(level, in);
-  cells_to_vertices(store, data(level, out), true, [&](std::int32_t cell, Vec(&f)[8]) {
+  cells_to_vertices(store, changed(level, out), true, [&](std::int32_t cell, Vec(&f)[8]) {
     Vec at[8];
     for (int i = 0; i < 8; ++i) at[i] = cpu::load(u, store.level->slots[cell][i]);
     cpu::cell_product(store, cell, at, f);
@@ -275,7 +281,7 @@ void CpuBackend::apply(int level, int in, int out) {
 void CpuBackend::apply_scaled(const OperatorScale& scale, int in, int out) {
   LevelStore& store = levels_[0];
   const double* u = data(0, in);
-  cells_to_vertices(store, data(0, out), false, [&](std::int32_t cell, Vec(&f)[8]) {
+  cells_to_vertices(store, changed(0, out), false, [&](std::int32_t cell, Vec(&f)[8]) {
     Vec at[8];
     for (int i = 0; i < 8; ++i) at[i] = cpu::load(u, store.level->slots[cell][i]);
     cpu::finest_product(store, scale, cell, at, f);
@@ -285,7 +291,7 @@ void CpuBackend::apply_scaled(const OperatorScale& scale, int in, int out) {
 void CpuBackend::elastic_force(int displacement, int out) {
   LevelStore& store = levels_[0];
   const double* u = data(0, displacement);
-  cells_to_vertices(store, data(0, out), false, [&](std::int32_t cell, Vec(&f)[8]) {
+  cells_to_vertices(store, changed(0, out), false, [&](std::int32_t cell, Vec(&f)[8]) {
     Vec at[8], corners[8];
     for (int i = 0; i < 8; ++i) at[i] = cpu::load(u, store.level->slots[cell][i]);
     kernels::unfold(at, store.level->fold[cell], corners);
@@ -298,8 +304,12 @@ void CpuBackend::elastic_force(int displacement, int out) {
 }
 
 double CpuBackend::residual(int level) {
-  apply(level, kSolution, kResidual);
-  combine(level, 1, kRight, -1, kResidual);
+  if (levels_[level].solution_is_zero) {
+    copy(level, kRight, kResidual);
+  } else {
+    apply(level, kSolution, kResidual);
+    combine(level, 1, kRight, -1, kResidual);
+  }
   return std::sqrt(dot(level, kResidual, kResidual));
 }
 
@@ -309,13 +319,13 @@ void CpuBackend::smooth(int level, SweepOrder order, int count) {
     if (smoother_.chebyshev)
       chebyshev(store, level);
     else
-      gauss_seidel(store, order);
+      gauss_seidel(store, level, order);
   }
 }
 
-void CpuBackend::gauss_seidel(LevelStore& store, SweepOrder order) {
+void CpuBackend::gauss_seidel(LevelStore& store, int level, SweepOrder order) {
   const Level& l = *store.level;
-  double* u = store.vectors[kSolution].data();
+  double* u = changed(level, kSolution);
   const double* f = store.vectors[kRight].data();
   for (int step = 0; step < l.colours(); ++step) {
     const int colour = order == SweepOrder::forward ? step : l.colours() - 1 - step;
@@ -343,6 +353,7 @@ void CpuBackend::chebyshev(LevelStore& store, int level) {
   const double* r = data(level, kResidual);
   for (int step = 0; step < smoother_.degree; ++step) {
     residual(level);
+    store.solution_is_zero = false;
     const double next = step == 0 ? rho : 1 / (2 * sigma - rho);
     const double keep = step == 0 ? 0 : next * rho, take = step == 0 ? 1 / theta : 2 * next / delta;
     rho = next;
@@ -397,7 +408,7 @@ void CpuBackend::restrict_residual(int fine) {
 void CpuBackend::prolong_correction(int fine) {
   const Level &f = *levels_[fine].level, &c = *levels_[fine + 1].level;
   const double* coarse = data(fine + 1, kSolution);
-  double* u = data(fine, kSolution);
+  double* u = changed(fine, kSolution);
   parallel(
       f.vertices(),
       [&](std::int32_t v) {
@@ -415,13 +426,14 @@ void CpuBackend::prolong_correction(int fine) {
 
 void CpuBackend::solve_coarsest() {
   LevelStore& store = levels_.back();
+  store.solution_is_zero = false;
   coarsest_factor_.solve(store.vectors[kRight], store.vectors[kSolution]);
 }
 
 void CpuBackend::precondition_jacobi(int level, int in, int out) {
   const LevelStore& store = levels_[level];
   const double* from = data(level, in);
-  double* to = data(level, out);
+  double* to = changed(level, out);
   parallel(
       store.vertices(),
       [&](std::int32_t v) { cpu::store(to, v, store.inverse_diagonal[v] * cpu::load(from, v)); },
@@ -431,15 +443,17 @@ void CpuBackend::precondition_jacobi(int level, int in, int out) {
 void CpuBackend::zero(int level, int x) {
   auto& vector = levels_[level].vectors[x];
   std::fill(vector.begin(), vector.end(), 0.0);
+  if (x == kSolution) levels_[level].solution_is_zero = true;
 }
 
 void CpuBackend::copy(int level, int from, int to) {
-  levels_[level].vectors[to] = levels_[level].vectors[from];
+  const auto& source = levels_[level].vectors[from];
+  std::copy(source.begin(), source.end(), changed(level, to));
 }
 
 void CpuBackend::combine(int level, double a, int x, double b, int y) {
   const double* from = data(level, x);
-  double* to = data(level, y);
+  double* to = changed(level, y);
   parallel(
       3 * levels_[level].vertices(), [&](std::int32_t i) { to[i] = a * from[i] + b * to[i]; },
       kWorthScalars);
@@ -467,7 +481,7 @@ double CpuBackend::dot(int level, int x, int y) {
 }
 
 void CpuBackend::mask(int level, int x) {
-  double* values = data(level, x);
+  double* values = changed(level, x);
   const Level& l = *levels_[level].level;
   parallel(
       l.vertices(),
@@ -476,9 +490,9 @@ void CpuBackend::mask(int level, int x) {
 }
 
 void CpuBackend::write(int level, int x, std::span<const double> values) {
-  auto& vector = levels_[level].vectors[x];
+  const auto& vector = levels_[level].vectors[x];
   expects(values.size() == vector.size(), "write: three values per vertex of the level");
-  std::copy(values.begin(), values.end(), vector.begin());
+  std::copy(values.begin(), values.end(), changed(level, x));
 }
 
 void CpuBackend::read(int level, int x, std::span<double> values) const {

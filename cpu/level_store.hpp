@@ -43,6 +43,7 @@ struct LevelStore {
   std::vector<double> matrices;              // tiles of 300 scalars; empty on level 0
   std::vector<Sym> inverse_diagonal;         // per vertex
   double bound = 0;                          // of the spectrum of D^-1 A
+  bool solution_is_zero = false;             // known: the first residual is f, no product needed
   std::vector<std::vector<double>> vectors;  // by VectorId, 3 per vertex
   std::vector<Vec> products;                 // 8 per cell: what each cell adds to its slots
 
