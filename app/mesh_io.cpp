@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "app/mesh_io.hpp"
 
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <fstream>
+#include <iterator>
 #include <limits>
-#include <new>
 
+#include "app/mesh_parse.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf {
@@ -38,6 +38,13 @@ void check_file(const std::filesystem::path& path) {
   expects(in.peek() != std::ifstream::traits_type::eof(), text(name, ": the file is empty"));
 }
 
+std::string whole_file(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  expects(!in.bad(), text(path.string(), ": cannot be read"));
+  return bytes;
+}
+
 TriangleMesh join(const aiScene& scene, const std::string& name) {
   TriangleMesh mesh;
   constexpr auto kMostPoints = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
@@ -52,15 +59,11 @@ TriangleMesh join(const aiScene& scene, const std::string& name) {
     }
     for (unsigned i = 0; i < part.mNumFaces; ++i) {
       const aiFace& face = part.mFaces[i];
-      if (face.mNumIndices != 3) continue;  // points and lines
-      std::array<std::int32_t, 3> triangle{};
-      for (unsigned k = 0; k < 3; ++k) {
+      for (unsigned k = 0; k < face.mNumIndices; ++k)
         expects(face.mIndices[k] < part.mNumVertices,
                 text(name, ": a face refers to point ", face.mIndices[k], ", but there are ",
                      part.mNumVertices));
-        triangle[k] = static_cast<std::int32_t>(first + face.mIndices[k]);
-      }
-      mesh.triangles.push_back(triangle);
+      add_polygon(mesh, face.mIndices, face.mNumIndices, first);  // none of points and lines
     }
   }
   return mesh;
@@ -70,14 +73,20 @@ TriangleMesh join(const aiScene& scene, const std::string& name) {
 
 TriangleMesh read_mesh(const std::filesystem::path& path) {
   check_file(path);
-  const std::string name = path.string();
+  const std::string name = path.string(), extension = lower_extension(path);
   TriangleMesh mesh;
   try {
-    Assimp::Importer importer;
-    const aiScene* scene = importer.ReadFile(name, aiProcess_Triangulate);
-    expects(scene != nullptr,
-            text(name, ": cannot be read as a mesh: ", importer.GetErrorString()));
-    mesh = join(*scene, name);
+    if (extension == ".off") {
+      mesh = parse_off(whole_file(path), name);
+    } else if (extension == ".ply") {
+      mesh = parse_ply(whole_file(path), name);
+    } else {
+      Assimp::Importer importer;
+      const aiScene* scene = importer.ReadFile(name, 0);  // its own triangulation aborts on some
+      expects(scene != nullptr,                           // damaged files: polygons are split here
+              text(name, ": cannot be read as a mesh: ", importer.GetErrorString()));
+      mesh = join(*scene, name);
+    }
   } catch (const Error&) {
     throw;
   } catch (const std::exception& failure) {
