@@ -47,8 +47,9 @@ DueCut CutSchedule::whole(std::size_t index) const {
 std::vector<DueCut> CutSchedule::due(int step) const {
   std::vector<DueCut> out;
   if (time_.mode == TimeMode::statics) {
-    for (const std::size_t index : groups_.at(static_cast<std::size_t>(step)))
-      out.push_back(whole(index));
+    if (step < steps_)
+      for (const std::size_t index : groups_[static_cast<std::size_t>(step)])
+        out.push_back(whole(index));
     return out;
   }
   const double from = step * time_.step, to = (step + 1) * time_.step;
@@ -60,9 +61,14 @@ std::vector<DueCut> CutSchedule::due(int step) const {
       continue;
     }
     const double length = *cut.end - cut.start;
-    const double t0 = std::clamp((from - cut.start) / length, 0.0, 1.0);
-    const double t1 = std::clamp((to - cut.start) / length, 0.0, 1.0);
-    if (t1 - t0 > kSlack)
+    // Each step begins where the last one ended, to the bit; slivers of rounding at the ends of the
+    // path belong to the step beside them.
+    const auto place = [&](double at) {
+      const double t = (at - cut.start) / length, sliver = slack / length;
+      return t < sliver ? 0.0 : t > 1 - sliver ? 1.0 : t;
+    };
+    const double t0 = place(from), t1 = place(to);
+    if (t0 < t1)
       out.push_back(
           {sweep_between(cut.lines, t0, t1), cut.deformed, static_cast<std::int32_t>(i) + 1});
   }

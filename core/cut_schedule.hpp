@@ -23,6 +23,7 @@ class CutSchedule {
   int steps() const { return steps_; }
   /// Dynamic: the fronts swept during [step, step + 1) * dt. Static: all cuts of one start time,
   /// whole; the first equilibrium comes before a cut that asks for the deformed state.
+  /// Later steps have none.
   std::vector<DueCut> due(int step) const;
 
  private:

@@ -46,7 +46,7 @@ struct Support {
 struct Gravity {
   Vec3d acceleration{};  ///< m/s^2
 };
-/// A force spread evenly by volume over the cells whose centre lies inside `box`.
+/// A force spread evenly over the finest cells whose centre lies inside `box`.
 struct BoxForce {
   Box3 box;
   Vec3d force{};  ///< N in all

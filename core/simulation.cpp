@@ -11,6 +11,7 @@
 #include "core/body/pieces.hpp"
 #include "core/cut_schedule.hpp"
 #include "core/fem/equilibrium.hpp"
+#include "core/fem/held.hpp"
 #include "core/fem/loads.hpp"
 #include "core/fem/motion.hpp"
 #include "core/levels/corners.hpp"
@@ -51,13 +52,13 @@ struct Simulation::Impl {
 
   void start();
   void build_structure();
+  void warn_of_idle_supports();
   void load_structure();
   void check_memory() const;
-  void check_held() const;
   bool apply_cut(const DueCut& due, StepReport& report);
   void transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
                 std::vector<std::vector<double>> values, const std::vector<double>& rotations);
-  void hold(const std::vector<double>& displacement);
+  std::vector<double> hold(std::vector<double> values, bool is_displacement) const;
   double natural_time() const;
   std::vector<double> read_vector(int x) const;
   StepReport step();
@@ -98,8 +99,9 @@ void Simulation::Impl::start() {
     equilibrium = std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
   build_structure();
   cells_before = hierarchy.values.size();
+  warn_of_idle_supports();
   load_structure();
-  hold(std::vector<double>(held.size(), 0.0));
+  backend->write(0, state.displacement, hold(std::vector<double>(held.size(), 0.0), true));
   prescribed = std::any_of(held.begin(), held.end(), [](double x) { return x != 0; });
   if (motion) {
     const AddTime timer(clock.step);
@@ -137,10 +139,22 @@ void Simulation::Impl::build_structure() {
   held = apply_supports(body.lattice(), setup.supports, level);
   hanging = count_hanging(level);
   piece = label_pieces(body, &pieces);
-  if (setup.time.mode == TimeMode::statics) check_held();
+  if (setup.time.mode == TimeMode::statics) expect_held(body.lattice(), level, piece, pieces);
   build_coarse_levels(hierarchy, {setup.solver.coarsest_vertices, setup.solver.max_levels,
                                   setup.solver.duplicate_cells});
   check_memory();
+}
+
+void Simulation::Impl::warn_of_idle_supports() {
+  const Level& level = hierarchy.levels[0];
+  for (std::size_t i = 0; i < setup.supports.size(); ++i) {
+    const auto holds = [&](const Vec3i& p) {
+      return setup.supports[i].box.contains(body.lattice().point(p));
+    };
+    if (std::none_of(level.point.begin(), level.point.end(), holds))
+      warnings.push_back(
+          text("support ", i, " holds nothing: no vertex of the body lies in its box"));
+  }
 }
 
 void Simulation::Impl::load_structure() {
@@ -171,39 +185,15 @@ void Simulation::Impl::check_memory() const {
                                            " GB; lower body.resolution or raise body.refinement"));
 }
 
-void Simulation::Impl::check_held() const {
-  const Level& level = hierarchy.levels[0];
-  std::vector<char> is_held(pieces, 0);
-  std::vector<std::int32_t> example(pieces, -1), size(pieces, 0);
-  for (std::int32_t c = 0; c < level.cells(); ++c) {
-    if (example[piece[c]] < 0) example[piece[c]] = c;
-    ++size[piece[c]];
-    for (const std::int32_t v : level.slots[c])
-      if (level.fixed[v] != 0) is_held[piece[c]] = 1;
-  }
-  for (std::size_t p = 0; p < pieces; ++p) {
-    if (is_held[p]) continue;
-    const Vec3d at = body.lattice().point(level.corner[example[p]]);
-    throw Error(
-        ErrorKind::bad_input,
-        text(
-            "static mode: piece ", p, " of ", pieces, " (", size[p], " cells, near x = ", at.x,
-            ", y = ", at.y, ", z = ", at.z,
-            " m) is held by no support, so it has no equilibrium; hold it with a [[support]], keep "
-            "the cut from separating it, or use time.mode = \"dynamic\""));
-  }
-}
-
-// Held components of the displacement; `now` for the others.
-void Simulation::Impl::hold(const std::vector<double>& now) {
-  std::vector<double> u = now;
+// `values` with held components set: to the held displacement, or to zero.
+std::vector<double> Simulation::Impl::hold(std::vector<double> values, bool is_displacement) const {
   const Level& level = hierarchy.levels[0];
   for (std::int32_t v = 0; v < level.vertices(); ++v)
     for (int c = 0; c < 3; ++c) {
       const std::size_t k = 3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(c);
-      if ((level.fixed[v] >> c) & 1) u[k] = held[k];
+      if ((level.fixed[v] >> c) & 1) values[k] = is_displacement ? held[k] : 0;
     }
-  backend->write(0, state.displacement, u);
+  return values;
 }
 
 std::vector<double> Simulation::Impl::read_vector(int x) const {
@@ -263,9 +253,14 @@ void Simulation::Impl::transfer(const Level& before, const std::vector<std::int3
       turned[4 * c + k] = rotations[4 * static_cast<std::size_t>(origin[c]) + k];
   }
   const Level& after = hierarchy.levels[0];
-  hold(transfer_values(before, values[0], after, origin));
-  backend->write(0, state.velocity, transfer_values(before, values[1], after, origin));
-  backend->write(0, state.memory, transfer_values(before, values[2], after, origin));
+  // A vertex that the refinement puts into a support stands still from now on.
+  const bool memory_is_displacement = setup.time.scheme == TimeScheme::central;
+  const auto write = [&](int x, std::size_t i, bool is_displacement) {
+    backend->write(0, x, hold(transfer_values(before, values[i], after, origin), is_displacement));
+  };
+  write(state.displacement, 0, true);
+  write(state.velocity, 1, false);
+  write(state.memory, 2, memory_is_displacement);
   backend->write_rotations(turned);
 }
 
