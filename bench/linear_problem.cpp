@@ -74,7 +74,8 @@ Convergence LinearProblem::measure(bool error_of_cg) {
   for (const Level& level : hierarchy_.levels) out.vertices.push_back(level.vertices());
 
   // The error of A u = 0 is u itself; the largest eigenvector of the cycle remains.
-  constexpr int kCycles = 60, kLast = 8;
+  const int cycles = setup_.cells > 48 ? 24 : 60;
+  constexpr int last = 8;
   SolverSetup alone = setup_.solver;
   Cycle cycle(*backend_, static_cast<int>(hierarchy_.levels.size()),
               {solver_->cycle_in_use(), alone.pre_sweeps, alone.post_sweeps,
@@ -84,13 +85,13 @@ Convergence LinearProblem::measure(bool error_of_cg) {
   backend_->mask(0, kSolution);
   double before = 0;
   const Timer timer;
-  for (int i = 0; i < kCycles; ++i) {
-    if (i == kCycles - kLast) before = std::sqrt(backend_->dot(0, kSolution, kSolution));
+  for (int i = 0; i < cycles; ++i) {
+    if (i == cycles - last) before = std::sqrt(backend_->dot(0, kSolution, kSolution));
     cycle.run();
   }
-  out.seconds_per_cycle = timer.seconds() / kCycles;
+  out.seconds_per_cycle = timer.seconds() / cycles;
   const double after = std::sqrt(backend_->dot(0, kSolution, kSolution));
-  out.factor = std::pow(after / before, 1.0 / kLast);
+  out.factor = std::pow(after / before, 1.0 / last);
   if (!error_of_cg) return out;
 
   backend_->zero(0, x_);
