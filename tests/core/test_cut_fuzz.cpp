@@ -18,33 +18,14 @@
 namespace kerf {
 namespace {
 
+using test::blade_count;
 using test::Dice;
+using test::random_body;
 
 using Records = std::unordered_map<LinkKey, LinkCut>;
 
 constexpr int kBladesPerBody = 8;
 constexpr std::uint64_t kFirstSeed = 20110501;
-
-int blade_count() {
-  const char* count = std::getenv("KERF_FUZZ");
-  return count == nullptr ? 400 : std::atoi(count);
-}
-
-Voxels random_body(Dice& dice) {
-  switch (dice.roll(5)) {
-    case 0:
-      return test::box_body({8, 8, 8});
-    case 1:
-      return test::box_body({1 + dice.roll(4), 5 + dice.roll(9), 1 + dice.roll(12)});
-    case 2:
-      return test::ball_body(12);
-    case 3:
-      return test::make_voxels(test::lattice_of({12, 12, 12}),
-                               [](const Vec3i& c) { return c[1] < 5 ? 1 : 2; });
-    default:
-      return test::two_limb_body({12, 6, 14});
-  }
-}
 
 /// Corners of the leaves after a bend, a stretch, and a jitter that opens cracks between leaves.
 std::vector<Vec3d> deformed_corners(const LinkedOctree& body, Dice& dice) {

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <random>
 
 #include "core/body/lattice.hpp"
 #include "tests/support/blades.hpp"
+#include "tests/support/bodies.hpp"
 
 namespace kerf::test {
 
@@ -130,5 +132,27 @@ class RandomBlades {
   Dice& dice_;
   TriangleMesh last_;
 };
+
+/// KERF_FUZZ, or `few`: enough for every day.
+inline int blade_count(int few = 400) {
+  const char* count = std::getenv("KERF_FUZZ");
+  return count == nullptr ? few : std::atoi(count);
+}
+
+inline Voxels random_body(Dice& dice) {
+  switch (dice.roll(5)) {
+    case 0:
+      return box_body({8, 8, 8});
+    case 1:
+      return box_body({1 + dice.roll(4), 5 + dice.roll(9), 1 + dice.roll(12)});
+    case 2:
+      return ball_body(12);
+    case 3:
+      return make_voxels(lattice_of({12, 12, 12}),
+                               [](const Vec3i& c) { return c[1] < 5 ? 1 : 2; });
+    default:
+      return two_limb_body({12, 6, 14});
+  }
+}
 
 }  // namespace kerf::test
