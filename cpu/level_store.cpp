@@ -125,23 +125,29 @@ void cell_matrix(const LevelStore& store, std::int32_t cell, double (&packed)[kE
 }
 
 Sym diagonal_block(const LevelStore& store, std::int32_t cell, int slot) {
-  if (store.finest != nullptr && hanging(store, cell) == 0) {
-    const FinestStore& finest = *store.finest;
-    const CellValues& values = (*finest.values)[cell];
-    return kernels::cell_diagonal(finest.materials[values.material].stiffness, finest.mass,
-                                  kernels::to_matrix(finest.rotation[cell]),
-                                  finest.scale.stiffness * values.stiffness,
-                                  finest.scale.mass * values.mass, slot);
+  if (store.finest == nullptr) {
+    const auto A = kernels::cell_entries(store.matrices.data(), static_cast<std::size_t>(cell),
+                                         kEntries, store.tile_log2);
+    return kernels::packed_diagonal<double>(A, slot);
   }
-  double packed[kEntries];
-  if (store.finest != nullptr)
-    folded_matrix(store, cell, packed);
-  else
-    cell_matrix(store, cell, packed);
-  const auto at = [&](int a, int b) {
-    return packed[kernels::packed_index(3 * slot + a, 3 * slot + b)];
-  };
-  return {at(0, 0), at(1, 0), at(2, 0), at(1, 1), at(2, 1), at(2, 2)};
+  const FinestStore& finest = *store.finest;
+  const CellValues& values = (*finest.values)[cell];
+  const auto& K = finest.materials[values.material].stiffness;
+  const Mat R = kernels::to_matrix(finest.rotation[cell]);
+  const double stiffness = finest.scale.stiffness * values.stiffness;
+  const double mass = finest.scale.mass * values.mass;
+  if (hanging(store, cell) == 0)
+    return kernels::cell_diagonal(K, finest.mass, R, stiffness, mass, slot);
+  // Only the few corners that this slot speaks for.
+  double weights[8][8];
+  kernels::fold_weights(store.level->fold[cell], weights);
+  Mat sum;
+  for (int k = 0; k < 8; ++k)
+    for (int l = 0; l < 8; ++l) {
+      const double w = weights[k][slot] * weights[l][slot];
+      if (w != 0) sum += kernels::rotate_block(K, finest.mass, R, w * stiffness, w * mass, k, l);
+    }
+  return kernels::lower_triangle(sum);
 }
 
 }  // namespace kerf::cpu
