@@ -20,6 +20,13 @@ SparseMap view(const AssembledLevel& m) {
       n, n, static_cast<int>(m.row.size()), m.column_begin.data(), m.row.data(), m.value.data()};
 }
 
+// A pivot is what is left of a diagonal entry when the unknowns before it are eliminated: its
+// stiffness when they give way. Rounding leaves some 1e-16 of it where nothing holds the body;
+// a beam 1000 times as long as thick still has 1e-10.
+constexpr double kSingular = 1e-13;
+
+bool is_pivot(double root, double diagonal) { return root * root > kSingular * diagonal; }
+
 // One virtual step keeps the engines apart; both see the same assembled matrix.
 struct Engine {
   virtual ~Engine() = default;
@@ -33,7 +40,13 @@ struct EigenEngine final : Engine {
   void analyse(const AssembledLevel& m) override { llt.analyzePattern(view(m)); }
   bool factor(const AssembledLevel& m) override {
     llt.factorize(view(m));
-    return llt.info() == Eigen::Success;
+    if (llt.info() != Eigen::Success) return false;
+    const auto& L = llt.matrixL().nestedExpression();
+    for (int i = 0; i < m.unknowns(); ++i) {
+      const int at = llt.permutationP().size() > 0 ? llt.permutationP().indices()(i) : i;
+      if (!is_pivot(L.valuePtr()[L.outerIndexPtr()[at]], m.value[m.column_begin[i]])) return false;
+    }
+    return true;
   }
   void solve(std::span<const double> right, std::span<double> solution) override {
     const auto n = static_cast<Eigen::Index>(right.size());
@@ -88,7 +101,7 @@ struct CholmodEngine final : Engine {
     cholmod_factorize(&a, factor_, &common);
     if (common.status == CHOLMOD_NOT_POSDEF) return false;
     check();
-    return factor_->minor == factor_->n;
+    return factor_->minor == factor_->n && has_pivots(m);
   }
   void solve(std::span<const double> right, std::span<double> solution) override {
     cholmod_dense b{};
@@ -104,6 +117,23 @@ struct CholmodEngine final : Engine {
   }
   std::size_t entries() const override { return static_cast<std::size_t>(common.lnz); }
 
+  bool has_pivots(const AssembledLevel& m) const {
+    ensures(factor_->is_super != 0, "CHOLMOD was asked for a supernodal factor");
+    const auto* super = static_cast<const int*>(factor_->super);
+    const auto* row_begin = static_cast<const int*>(factor_->pi);
+    const auto* value_begin = static_cast<const int*>(factor_->px);
+    const auto* order = static_cast<const int*>(factor_->Perm);
+    const auto* value = static_cast<const double*>(factor_->x);
+    for (std::size_t s = 0; s < factor_->nsuper; ++s) {
+      const int rows = row_begin[s + 1] - row_begin[s];
+      for (int k = 0; k < super[s + 1] - super[s]; ++k) {
+        // Columns of a supernode lie one after another, each with all its rows.
+        const double root = value[value_begin[s] + static_cast<std::ptrdiff_t>(k) * (rows + 1)];
+        if (!is_pivot(root, m.value[m.column_begin[order[super[s] + k]]])) return false;
+      }
+    }
+    return true;
+  }
   void check() const {
     if (common.status == CHOLMOD_OUT_OF_MEMORY)
       throw Error(ErrorKind::unavailable,

@@ -49,7 +49,7 @@ class SparseCholesky {
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   void analyse(const AssembledLevel& matrix);  ///< fill-reducing order, pattern of the factor
-  /// @returns whether the matrix is positive definite; if not, there is no factor.
+  /// @returns whether the matrix is positive definite beyond rounding; if not, there is no factor.
   bool factor(const AssembledLevel& matrix);
   void solve(std::span<const double> right, std::span<double> solution) const;
   std::size_t factor_entries() const;
