@@ -2,8 +2,6 @@
 //
 // Vertices, hanging corners and coarse levels against brute force over finest links, and against
 // two cases drawn by hand (the pictures of figures 5 and 6 of [DGW11] show cases of the same kind).
-#include "core/levels/hierarchy.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <set>
 
 #include "core/levels/corners.hpp"
+#include "core/levels/hierarchy.hpp"
 #include "tests/oracle/levels_oracle.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -183,6 +182,29 @@ INSTANTIATE_TEST_SUITE_P(Levels, LevelsOfScene,
                                            "crossed", "arc"),
                          [](const auto& scene) { return std::string(scene.param); });
 
+// What the scenes are for; operators are tested on the same ones.
+TEST(Levels, ScenesHaveTheirFeatures) {
+  const auto hanging = [](const Level& level) {
+    return std::count_if(level.fold.begin(), level.fold.end(),
+                         [](auto f) { return (f & 255) != 0; });
+  };
+  const auto shares_a_place = [](const Level& level) {
+    return std::adjacent_find(level.point.begin(), level.point.end()) != level.point.end();
+  };
+  const auto duplicates = [](const Level& level) {
+    return std::adjacent_find(level.corner.begin(), level.corner.end()) != level.corner.end();
+  };
+  for (const char* name : {"octree1", "octree2", "octree3", "half_cut", "arc", "limbs"})
+    EXPECT_GT(hanging(finest_level(test::scene(name))), 0) << name;
+  for (const char* name : {"octree2", "octree3"})
+    EXPECT_GT(hanging(hierarchy_of(test::scene(name), 8).levels[1]), 0) << name;
+  for (const char* name : {"bar", "half_cut", "crossed", "arc", "limbs"}) {
+    const Hierarchy h = hierarchy_of(test::scene(name), 8);
+    EXPECT_TRUE(shares_a_place(h.levels[0])) << name;
+    EXPECT_TRUE(std::any_of(h.levels.begin(), h.levels.end(), duplicates)) << name;
+  }
+}
+
 TEST(Levels, OfRandomCutsAreThoseOfTheLinks) {
   constexpr std::uint64_t kFirstSeed = 1105, kBodies = 25;
   for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + kBodies; ++seed) {
@@ -232,9 +254,8 @@ LinkedOctree slab_with_l() {
 TEST(LevelsByHand, SlabWithAnL) {
   const Hierarchy h = hierarchy_of(slab_with_l(), 8);
   ASSERT_EQ(h.levels.size(), 4u);
-  EXPECT_EQ(h.levels[0].parent,
-            (std::vector<std::int32_t>{0, 0, 1, 1, 3, 3, 0, 0, 1, 2, 3, 3, 4, 4, 5, 6, 7, 7, 4, 4,
-                                       5, 6, 7, 7}));
+  EXPECT_EQ(h.levels[0].parent, (std::vector<std::int32_t>{0, 0, 1, 1, 3, 3, 0, 0, 1, 2, 3, 3,
+                                                           4, 4, 5, 6, 7, 7, 4, 4, 5, 6, 7, 7}));
   EXPECT_EQ(h.levels[1].parent, (std::vector<std::int32_t>{0, 0, 1, 2, 0, 0, 1, 2}));
   EXPECT_EQ(h.levels[2].parent, (std::vector<std::int32_t>{0, 0, 0}));
   EXPECT_EQ(h.levels[1].corner[1], h.levels[1].corner[2]);  // B and B' share their place
@@ -274,7 +295,8 @@ TEST(LevelsByHand, SlabWithAnLMergedByPlace) {
 // A box of 10 x 6 x 6 with one level of refinement: 5 x 3 x 3 blocks, and three leaves of side 2
 // inside, at (2, 2, 2), (4, 2, 2), (6, 2, 2). An L in the last layer of blocks, seen along y:
 //
-//     z=5   .   .     .   . |  .          Upright: links along x between x = 8 and 9, z >= 2, all y.
+//     z=5   .   .     .   . |  .          Upright: links along x between x = 8 and 9, z >= 2, all
+//     y.
 //      :                    |             Foot: links along z between z = 1 and 2 at x = 9, y <= 3.
 //     z=2   .  ###   ###  . |  .          So the part x = 9, z >= 2 hangs on the two columns
 //                           +----         y = 4, 5 alone. ### are the larger leaves.
@@ -284,7 +306,8 @@ TEST(LevelsByHand, SlabWithAnLMergedByPlace) {
 //
 // Level 1: the blocks bx = 4, bz = 1, 2 fall apart into a left (x = 8) and a right part, 6 more
 //   cells than blocks. The three larger leaves pass through.
-// Level 2: blocks of 4^3, 3 x 2 x 2. At bx = 2 the block (by, bz) = (0, 0) holds rights that no link
+// Level 2: blocks of 4^3, 3 x 2 x 2. At bx = 2 the block (by, bz) = (0, 0) holds rights that no
+// link
 //   inside it joins to the base, (0, 1) and (1, 1) hold no base: two cells each. In (1, 0) the foot
 //   is open: one cell.
 // Level 3: 2 blocks of 8^3, and the cut is seen no more.
@@ -333,9 +356,10 @@ TEST(Levels, CoarseComponentIsHeldIffAllThatItMovesAreHeld) {
     test::Dice dice(3);
     // Held in x within a slab that no coarse grid agrees with; the rest here and there.
     for (std::int32_t v = 0; v < finest.vertices(); ++v)
-      finest.fixed[v] = static_cast<std::uint8_t>(
-          (finest.point[v][0] <= 3 ? 1 : 0) | (finest.point[v][1] >= 5 || dice.roll(2) == 0 ? 2 : 0) |
-          (finest.point[v][0] <= 5 && finest.point[v][2] <= 3 ? 4 : 0));
+      finest.fixed[v] =
+          static_cast<std::uint8_t>((finest.point[v][0] <= 3 ? 1 : 0) |
+                                    (finest.point[v][1] >= 5 || dice.roll(2) == 0 ? 2 : 0) |
+                                    (finest.point[v][0] <= 5 && finest.point[v][2] <= 3 ? 4 : 0));
     build_coarse_levels(h, {8, 0, true});
     std::vector<Grid> grids;
     ASSERT_NO_THROW(grids = oracle::grids_like(body, h));

@@ -133,8 +133,8 @@ Structure merged(const Structure& fine, int size, bool duplicate) {
     }
   }
   for (const auto& [corner, members] : blocks) {
-    const auto groups = components(
-        members, [&](int a, int b) { return !duplicate || beside[a].count(b) > 0; });
+    const auto groups =
+        components(members, [&](int a, int b) { return !duplicate || beside[a].count(b) > 0; });
     for (const auto& group : groups) {
       Cell cell{corner, 2 * size, {}};
       for (const int c : group) {
@@ -170,7 +170,8 @@ Structure reordered(const Structure& from, const Level& level,
   std::vector<int> at(from.cells.size());
   for (std::size_t c = 0; c < from.cells.size(); ++c) {
     const auto found = index.find(from.cells[c].leaves);
-    if (found == index.end()) wrong("no such component among the cells", number, static_cast<int>(c));
+    if (found == index.end())
+      wrong("no such component among the cells", number, static_cast<int>(c));
     at[c] = found->second;
     to.cells[at[c]] = from.cells[c];
     if (level.corner[at[c]] != from.cells[c].corner ||
@@ -219,15 +220,14 @@ class Meetings {
       const Cell& cell = s.cells[c];
       const int n = cell.size + 1;
       for (int k = 0; k < n * n * n; ++k) {
-        const auto at = around.find({cell.corner[0] + k % n, cell.corner[1] + k / n % n,
-                                     cell.corner[2] + k / n / n});
+        const auto at = around.find(
+            {cell.corner[0] + k % n, cell.corner[1] + k / n % n, cell.corner[2] + k / n / n});
         if (at != around.end()) at->second.push_back(static_cast<int>(c));
       }
     }
     const auto beside = neighbours(s.cells.size(), s.joins);
     for (const auto& [p, list] : around)
-      for (auto& group :
-           components(list, [&](int a, int b) { return beside[a].count(b) > 0; })) {
+      for (auto& group : components(list, [&](int a, int b) { return beside[a].count(b) > 0; })) {
         for (const int c : group) group_of_[{p, c}] = static_cast<int>(groups.size());
         groups.push_back({p, std::move(group)});
       }
@@ -280,8 +280,7 @@ class Builder {
       if (corner_at(grid.cells[c], group.point) >= 0) continue;
       std::array<Weights, 8> corners;
       for (int i = 0; i < 8; ++i)
-        corners[static_cast<std::size_t>(i)] =
-            value(meetings_.at(corner_of(grid.cells[c], i), c));
+        corners[static_cast<std::size_t>(i)] = value(meetings_.at(corner_of(grid.cells[c], i), c));
       const Weights here = trilinear(grid.cells[c], group.point, corners);
       if (found.empty()) found = here;
       if (!same(found, here)) wrong("two larger cells disagree on a hanging corner", -1, c);
@@ -406,9 +405,9 @@ std::vector<Weights> prolongation(const Grid& fine, const Grid& coarse) {
     for (std::size_t i = 0; i < 8; ++i) {
       if (fine.hangs[c][i]) continue;
       const int v = fine.corner[c][i].begin()->first;
-      const Weights here = trilinear(coarse.cells[parent[c]],
-                                     corner_of(fine.cells[c], static_cast<int>(i)),
-                                     coarse.corner[parent[c]]);
+      const Weights here =
+          trilinear(coarse.cells[parent[c]], corner_of(fine.cells[c], static_cast<int>(i)),
+                    coarse.corner[parent[c]]);
       if (out[v].empty()) out[v] = here;
       if (!same(out[v], here)) wrong("two parents disagree on a vertex", -1, v);
     }

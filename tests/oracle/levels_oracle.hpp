@@ -34,13 +34,13 @@ struct Grid {
   Joins joins;
   std::vector<std::array<Weights, 8>> corner;  ///< the value at each corner of each cell
   std::vector<std::array<bool, 8>> hangs;
-  std::vector<Vec3i> point;                    ///< of each vertex
+  std::vector<Vec3i> point;  ///< of each vertex
 };
 
 /// Which (leaf, corner) share a vertex, from the eight finest cells around every grid point.
 struct Sharing {
-  std::vector<std::array<int, 8>> group;    ///< per leaf and corner; equal iff they share
-  std::vector<std::array<bool, 8>> hangs;   ///< some leaf of the group lacks the point as a corner
+  std::vector<std::array<int, 8>> group;   ///< per leaf and corner; equal iff they share
+  std::vector<std::array<bool, 8>> hangs;  ///< some leaf of the group lacks the point as a corner
 };
 Sharing share_by_octants(const LinkedOctree& body);
 

@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: MIT
+//
+// The linear solver: every method against a direct solution of a matrix that shares no code with
+// it, what it reports against the same matrix, and what it does where there is no solution.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.hpp"
+#include "core/solve/linear_solver.hpp"
+#include "tests/support/problem.hpp"
+
+namespace kerf {
+namespace {
+
+using oracle::Sparse;
+using oracle::Vector;
+using test::Holds;
+using test::Problem;
+using test::ProblemOptions;
+
+constexpr double kAccuracy = 1e-9;  // of the solution
+constexpr double kTight = 1e-11;    // asked of the solvers, as a residual, where rounding allows
+constexpr double kRounding = 1e-12;
+constexpr OperatorScale kStatic{1, 0}, kDynamic{0.8, 400};
+
+/// A problem with its right-hand side and direct solution.
+struct Case {
+  Problem problem;
+  OperatorScale scale;
+  Sparse A;
+  Vector b, x;
+  double floor = 0;  ///< rounding of the residual of the solution itself, relative to |b|
+
+  Case(const std::string& name, const OperatorScale& s,
+       const ProblemOptions& options = static_options())
+      : Case(test::scene(name), s, options) {}
+  Case(LinkedOctree body, const OperatorScale& s, const ProblemOptions& options = static_options())
+      : problem(std::move(body), options), scale(s) {
+    const auto R = oracle::rotations(problem.grids[0], problem.physics, problem.deformation());
+    A = oracle::masked(oracle::assemble(problem.grids[0], problem.physics, R, scale),
+                       problem.fixed(0), problem.fixed(0));
+    b = problem.free_vector(0, 17);
+    x = oracle::solve(A, problem.fixed(0), b);
+    constexpr double kSums = 8e-16;  // each entry of A x is a sum of sums
+    floor = kSums * (A.cwiseAbs() * x.cwiseAbs()).norm() / b.norm();
+  }
+  static ProblemOptions static_options() {
+    ProblemOptions options;
+    options.holds = Holds::one_side;
+    return options;
+  }
+};
+
+struct Outcome {
+  SolveStats stats;
+  Vector x;
+};
+
+Outcome solve(const Problem& p, const Vector& deformation, const OperatorScale& scale,
+              const SolverSetup& setup, const Vector& b, const Vector& start, double tolerance,
+              double reference = 0) {
+  const std::unique_ptr<Backend> backend = test::make_backend("cpu");
+  LinearSolver solver(*backend, setup);
+  const int right = backend->add_vector(), solution = backend->add_vector();
+  backend->load(p.hierarchy);
+  solver.set_structure(p.hierarchy);
+  backend->set_operator(scale);
+  test::write(*backend, 0, solution, deformation);
+  backend->rotate_cells(solution);
+  solver.refresh();
+  test::write(*backend, 0, right, b);
+  test::write(*backend, 0, solution, start);
+  const SolveStats stats = solver.solve(right, solution, tolerance, reference);
+  return {stats, p.read(*backend, 0, solution)};
+}
+
+/// What may be asked of a solver's residual.
+double tight(const Case& c) { return std::max(kTight, 10 * c.floor); }
+
+Outcome solve(const Case& c, const SolverSetup& setup, double tolerance) {
+  return solve(c.problem, c.problem.deformation(), c.scale, setup, c.b, Vector::Zero(c.b.size()),
+               tolerance);
+}
+
+void expect_true_residual(const Case& c, const Outcome& outcome) {
+  const double residual = (c.b - c.A * outcome.x).norm() / c.b.norm();
+  EXPECT_NEAR(outcome.stats.residual, residual, 3 * c.floor + kRounding * residual);
+}
+
+void expect_solution(const Case& c, const SolverSetup& setup) {
+  const Outcome outcome = solve(c, setup, tight(c));
+  EXPECT_TRUE(outcome.stats.converged);
+  EXPECT_LE(outcome.stats.residual, tight(c) * (1 + kRounding));
+  EXPECT_GE(outcome.stats.cycles, 1);
+  EXPECT_LE((outcome.x - c.x).norm(), kAccuracy * c.x.norm());
+  expect_true_residual(c, outcome);
+}
+
+SolverSetup setup_of(SolverMethod method, CycleType cycle = CycleType::v,
+                     SmootherType smoother = SmootherType::chebyshev) {
+  SolverSetup setup;
+  setup.method = method;
+  setup.cycle = cycle;
+  setup.smoother = smoother;
+  return setup;
+}
+
+class SolverOnScene : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Solver, SolverOnScene,
+                         ::testing::Values("uniform", "octree2", "bar", "half_cut", "limbs", "arc"),
+                         [](const auto& scene) { return std::string(scene.param); });
+
+TEST_P(SolverOnScene, EveryMethodGivesTheDirectSolution) {
+  const Case c(GetParam(), kStatic);
+  for (const SmootherType smoother : {SmootherType::chebyshev, SmootherType::gauss_seidel})
+    for (const CycleType cycle : {CycleType::v, CycleType::w, CycleType::k}) {
+      SCOPED_TRACE(::testing::Message() << "cycle " << static_cast<int>(cycle));
+      expect_solution(c, setup_of(SolverMethod::cg, cycle, smoother));
+    }
+  // Alone, V and W are slow where a piece is thinner than the coarse cells; K is not.
+  expect_solution(c, setup_of(SolverMethod::multigrid, CycleType::k));
+  expect_solution(c, setup_of(SolverMethod::cg_jacobi));
+  expect_solution(c, setup_of(SolverMethod::cholesky));
+}
+
+TEST(Solver, MultigridAloneGivesTheDirectSolution) {
+  for (const char* name : {"uniform", "octree1"}) {
+    const Case c(name, kStatic);
+    for (const SmootherType smoother : {SmootherType::chebyshev, SmootherType::gauss_seidel})
+      for (const CycleType cycle : {CycleType::v, CycleType::w, CycleType::k})
+        expect_solution(c, setup_of(SolverMethod::multigrid, cycle, smoother));
+  }
+}
+
+TEST(Solver, FloatingPiecesAreSolvedInDynamics) {
+  for (const char* name : {"floating", "crossed"}) {
+    ProblemOptions options;
+    options.holds = Holds::one_side;
+    options.lumped_mass = true;
+    options.materials = 1;  // multigrid alone is slow where stiff and soft share thin pieces
+    const Case c(name, kDynamic, options);
+    for (const SolverMethod method : {SolverMethod::cg, SolverMethod::multigrid,
+                                      SolverMethod::cg_jacobi, SolverMethod::cholesky})
+      expect_solution(c, setup_of(method, CycleType::k));
+  }
+}
+
+TEST(Solver, MergingByPlaceConvergesToTheSameSolution) {
+  for (const char* name : {"half_cut", "limbs", "bar"}) {
+    ProblemOptions options = Case::static_options();
+    options.duplicate_cells = false;
+    expect_solution(Case(name, kStatic, options), setup_of(SolverMethod::cg));
+  }
+}
+
+TEST(Solver, AutomaticCycleIsKOnCutBodiesOnly) {
+  for (const bool cut : {false, true}) {
+    Problem p("uniform", Case::static_options());
+    p.hierarchy.cut = cut;
+    const std::unique_ptr<Backend> backend = test::make_backend("cpu");
+    LinearSolver solver(*backend, {});
+    backend->load(p.hierarchy);
+    solver.set_structure(p.hierarchy);
+    EXPECT_EQ(solver.cycle_in_use(), cut ? CycleType::k : CycleType::v);
+  }
+}
+
+TEST(Solver, FixedNumberOfCyclesIsThatNumber) {
+  const Case c("half_cut", kStatic);
+  for (const SolverMethod method :
+       {SolverMethod::cg, SolverMethod::multigrid, SolverMethod::cg_jacobi}) {
+    SolverSetup setup = setup_of(method);
+    double before = 1;
+    for (const int cycles : {1, 3}) {
+      setup.cycles = cycles;
+      const Outcome outcome = solve(c, setup, 0.5);  // met long before: must not matter
+      EXPECT_EQ(outcome.stats.cycles, cycles);
+      EXPECT_TRUE(outcome.stats.converged);
+      expect_true_residual(c, outcome);
+      if (method != SolverMethod::cg_jacobi) {
+        EXPECT_LT(outcome.stats.residual, before);
+      }
+      before = outcome.stats.residual;
+    }
+  }
+}
+
+TEST(Solver, StopsAtTheToleranceAndSaysWhenItDoesNotReachIt) {
+  const Case c("limbs", kStatic);
+  SolverSetup setup = setup_of(SolverMethod::cg);
+  const Outcome loose = solve(c, setup, 1e-3), tight = solve(c, setup, 1e-8);
+  EXPECT_LE(loose.stats.residual, 1e-3);
+  EXPECT_LE(tight.stats.residual, 1e-8);
+  EXPECT_LT(loose.stats.cycles, tight.stats.cycles);
+  setup.max_cycles = 2;
+  for (const SolverMethod method : {SolverMethod::cg, SolverMethod::multigrid}) {
+    setup.method = method;
+    const Outcome stopped = solve(c, setup, 1e-8);
+    EXPECT_EQ(stopped.stats.cycles, 2);
+    EXPECT_FALSE(stopped.stats.converged);
+    expect_true_residual(c, stopped);
+  }
+}
+
+TEST(Solver, WarmStartAndReference) {
+  const Case c("octree2", kStatic);
+  const SolverSetup setup = setup_of(SolverMethod::cg);
+  const Outcome done = solve(c.problem, c.problem.deformation(), c.scale, setup, c.b, c.x, 1e-9);
+  EXPECT_EQ(done.stats.cycles, 0);
+  EXPECT_TRUE(done.stats.converged);
+  EXPECT_EQ(done.x, c.x);
+  const double reference = 1e6 * c.b.norm();
+  const Outcome rough = solve(c.problem, c.problem.deformation(), c.scale, setup, c.b,
+                              Vector::Zero(c.b.size()), 1e-8, reference);
+  EXPECT_TRUE(rough.stats.converged);
+  EXPECT_NEAR(rough.stats.residual, (c.b - c.A * rough.x).norm() / reference, kRounding);
+  EXPECT_LT(rough.stats.cycles, solve(c, setup, 1e-8).stats.cycles);
+}
+
+TEST(Solver, ZeroRightHandSideGivesZero) {
+  const Case c("bar", kStatic);
+  for (const SolverMethod method :
+       {SolverMethod::cg, SolverMethod::multigrid, SolverMethod::cg_jacobi, SolverMethod::cholesky})
+    for (const int cycles : {0, 2}) {
+      SolverSetup setup = setup_of(method);
+      setup.cycles = cycles;
+      const Outcome outcome = solve(c.problem, c.problem.deformation(), c.scale, setup,
+                                    Vector::Zero(c.b.size()), c.x, 1e-8);
+      EXPECT_TRUE(outcome.stats.converged);
+      EXPECT_EQ(outcome.stats.residual, 0);
+      EXPECT_EQ(outcome.x.norm(), 0);
+    }
+}
+
+TEST(Solver, HeldCompletelyIsNoProblem) {
+  Problem p("uniform", Case::static_options());
+  for (Level& level : p.hierarchy.levels)
+    std::fill(level.fixed.begin(), level.fixed.end(), std::uint8_t{7});
+  const Vector zero = Vector::Zero(static_cast<Eigen::Index>(p.unknowns(0)));
+  for (const SolverMethod method : {SolverMethod::cg, SolverMethod::multigrid,
+                                    SolverMethod::cg_jacobi, SolverMethod::cholesky}) {
+    const Outcome outcome = solve(p, zero, kStatic, setup_of(method), zero, zero, 1e-8);
+    EXPECT_TRUE(outcome.stats.converged);
+    EXPECT_EQ(outcome.x.norm(), 0);
+  }
+}
+
+// ---- No solution --------------------------------------------------------------------------------
+
+// At rest: the linearised matrix of a bent body knows no turn that leaves it without force.
+void expect_singular(const Problem& p, SolverMethod method) {
+  const Vector b = p.free_vector(0, 3), zero = Vector::Zero(b.size());
+  try {
+    solve(p, zero, kStatic, setup_of(method), b, zero, 1e-6);
+    ADD_FAILURE() << "a body that can move freely was solved";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+    EXPECT_NE(std::string(error.what()).find("[[support]]"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Solver, BodiesThatMoveFreelyAreBadInput) {
+  for (const SolverMethod method :
+       {SolverMethod::cg, SolverMethod::multigrid, SolverMethod::cholesky}) {
+    SCOPED_TRACE(static_cast<int>(method));
+    for (const char* name : {"one_cell", "uniform", "octree1", "half_cut"}) {
+      SCOPED_TRACE(name);
+      ProblemOptions options;
+      options.holds = Holds::none;
+      options.with_oracle = false;
+      expect_singular(Problem(name, options), method);  // nothing held
+      Problem hinged(name, options);                    // a point held: free to turn
+      hinged.hierarchy.levels[0].fixed[0] = 7;
+      build_coarse_levels(hinged.hierarchy, {options.coarsest_vertices, 0, true});
+      expect_singular(hinged, method);
+    }
+    for (const char* name : {"floating", "crossed"}) {  // a piece that nothing holds
+      SCOPED_TRACE(name);
+      ProblemOptions options = Case::static_options();
+      options.with_oracle = false;
+      expect_singular(Problem(name, options), method);
+    }
+  }
+}
+
+TEST(Solver, SlenderBodiesThatAreHeldAreNotSingular) {
+  // A beam of 120 cells, one thick: its softest mode is 1e-9 of the stiffest.
+  ProblemOptions options = Case::static_options();
+  options.materials = 1;
+  const Case c(LinkedOctree(test::box_body({120, 1, 1}), 0), kStatic, options);
+  constexpr double kDirect = 1e-9, kSlender = 1e-5;
+  for (const SolverMethod method : {SolverMethod::cg, SolverMethod::cholesky}) {
+    const Outcome outcome = solve(c, setup_of(method), kDirect);
+    EXPECT_TRUE(outcome.stats.converged);
+    EXPECT_LE((outcome.x - c.x).norm(), kSlender * c.x.norm());
+  }
+}
+
+// ---- Factorisation ------------------------------------------------------------------------------
+
+TEST(SparseCholesky, BothEnginesSolveTheAssembledMatrix) {
+  for (const char* name : {"octree1", "half_cut"}) {
+    const Case c(name, kStatic);
+    const Problem& p = c.problem;
+    const test::Loaded loaded(p, test::make_backend("cpu"), kStatic, {}, p.deformation());
+    for (int l = 0; l < p.levels(); ++l) {
+      AssembledLevel matrix(p.level(l));
+      matrix.assemble(p.level(l), [&](std::int32_t cell, std::span<double> out) {
+        loaded.backend->read_cell_matrix(l, cell, out);
+      });
+      const auto n = static_cast<Eigen::Index>(p.unknowns(l));
+      ASSERT_EQ(matrix.unknowns(), n);
+      const Sparse lower = Eigen::Map<const Sparse>(
+          n, n, static_cast<Eigen::Index>(matrix.row.size()), matrix.column_begin.data(),
+          matrix.row.data(), matrix.value.data());
+      const Sparse stored = oracle::assemble_stored(*loaded.backend, l, p.level(l));
+      Sparse units(n, n);
+      for (int i = 0; i < n; ++i)
+        if ((p.fixed(l)[static_cast<std::size_t>(i / 3)] >> (i % 3)) & 1) units.insert(i, i) = 1;
+      const Sparse expected = Sparse(stored + units).triangularView<Eigen::Lower>();
+      EXPECT_LE(Sparse(lower - expected).norm(), kRounding * expected.norm());
+
+      const Vector b = p.free_vector(l, 7);
+      const Vector x = oracle::solve(stored, p.fixed(l), b);
+      for (const CholeskyEngine engine : {CholeskyEngine::simplicial, CholeskyEngine::supernodal}) {
+        SparseCholesky cholesky(engine);
+        cholesky.analyse(matrix);
+        ASSERT_TRUE(cholesky.factor(matrix));
+        ASSERT_TRUE(cholesky.factor(matrix));  // values again, same pattern
+        EXPECT_GE(cholesky.factor_entries(), p.unknowns(l));
+        Vector found(n);
+        cholesky.solve(test::span_of(b), {found.data(), p.unknowns(l)});
+        EXPECT_LE((found - x).norm(), kAccuracy * x.norm()) << name << ", level " << l;
+      }
+    }
+  }
+}
+
+TEST(SparseCholesky, SeesAMatrixThatIsNotPositive) {
+  const Problem p("uniform", Case::static_options());
+  const test::Loaded loaded(p, test::make_backend("cpu"), {-1, 0}, {}, p.deformation());
+  AssembledLevel matrix(p.level(0));
+  matrix.assemble(p.level(0), [&](std::int32_t cell, std::span<double> out) {
+    loaded.backend->read_cell_matrix(0, cell, out);
+  });
+  for (const CholeskyEngine engine : {CholeskyEngine::simplicial, CholeskyEngine::supernodal}) {
+    SparseCholesky cholesky(engine);
+    cholesky.analyse(matrix);
+    EXPECT_FALSE(cholesky.factor(matrix));
+  }
+}
+
+}  // namespace
+}  // namespace kerf
