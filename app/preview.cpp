@@ -49,17 +49,18 @@ Vec cut_colour(std::int32_t id) {
 }
 constexpr Vec kBodyColour{0.60f, 0.475f, 0.36f};
 
-/// The surface in Embree, scaled to a box of diagonal 1 around the origin.
+/// The surface in Embree, scaled so that what is framed has a box of diagonal 1 around the origin.
 class RayScene {
  public:
   explicit RayScene(const PreviewSurface& surface) : surface_(surface) {
     Box3 box;
-    for (const auto& p : surface.points) box.add(p);
+    for (const auto p : surface.framed) box.add(surface.points[p]);
     const Vec3d middle = 0.5 * (box.lo + box.hi);
     const double diagonal = norm(box.extent());
     const double scale = diagonal > 0 ? 1 / diagonal : 1;
     cell_ = static_cast<float>(surface.cell * scale);
     for (const auto& p : surface.points) points_.push_back(to_float((p - middle) * scale));
+    for (const auto p : surface.framed) framed_.push_back(points_[p]);
 
     device_ = rtcNewDevice("verbose=0");
     if (device_ == nullptr)
@@ -127,7 +128,7 @@ class RayScene {
     return ray.tfar < 0;
   }
 
-  const std::vector<Vec>& points() const { return points_; }
+  const std::vector<Vec>& framed() const { return framed_; }
   float cell() const { return cell_; }
 
  private:
@@ -140,7 +141,7 @@ class RayScene {
   }
 
   const PreviewSurface& surface_;
-  std::vector<Vec> points_;
+  std::vector<Vec> points_, framed_;
   float cell_ = 0;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
@@ -197,11 +198,11 @@ Camera choose_camera(const RayScene& scene, const Vec& up, float aspect) {
     const float a = azimuth * kPi / 180, e = elevation * kPi / 180;
     return std::cos(e) * (std::sin(a) * s + std::cos(a) * f) + std::sin(e) * up;
   };
-  Camera best = fit_camera(scene.points(), direction(35, 22), up, aspect);
+  Camera best = fit_camera(scene.framed(), direction(35, 22), up, aspect);
   int most = kScoutWidth * kScoutHeight / 2000;  // a handful of pixels does not decide the view
   for (const float elevation : {14.0f, 30.0f, 46.0f})
     for (float azimuth = 5; azimuth < 360; azimuth += 30) {
-      const Camera camera = fit_camera(scene.points(), direction(azimuth, elevation), up, aspect);
+      const Camera camera = fit_camera(scene.framed(), direction(azimuth, elevation), up, aspect);
       int seen = 0;
       for (int y = 0; y < kScoutHeight; ++y)
         for (int x = 0; x < kScoutWidth; ++x) {
@@ -249,7 +250,7 @@ class Painter {
       : scene_(scene), camera_(camera), up_(up), options_(options) {
     key_ = unit(0.75f * camera.back + 0.95f * up - 0.55f * camera.right);
     fill_ = unit(0.5f * camera.back + 0.2f * up + 0.9f * camera.right);
-    for (const auto& p : scene.points()) ground_ = std::min(ground_, dot(p, up));
+    for (const auto& p : scene.framed()) ground_ = std::min(ground_, dot(p, up));
   }
 
   Vec pixel(int px, int py) const {

@@ -14,6 +14,7 @@ constexpr int kSmoothingSteps = 24;
 constexpr double kShrink = 0.5, kGrow = -0.53;
 constexpr double kLargestMove = 0.5;  // cell sides
 constexpr int kNormalSteps = 3;
+constexpr double kCrumb = 0.01;  // of the faces: smaller pieces do not count for the frame
 
 struct Edge {
   std::int32_t a, b;  // points, a < b
@@ -134,6 +135,22 @@ std::array<std::size_t, 4> face_corners(int face) {
   return {base, base + bv, base + bu + bv, base + bu};
 }
 
+/// The points of pieces that are no crumbs.
+std::vector<std::int32_t> framed_points(const PreviewSurface& s, const Snapshot& snapshot) {
+  std::map<std::int32_t, std::size_t> faces;
+  for (const auto& face : snapshot.boundary) ++faces[snapshot.piece[face.cell]];
+  std::vector<std::uint8_t> framed(s.points.size(), 0);
+  for (std::size_t q = 0; q < s.quads.size(); ++q) {
+    const std::size_t size = faces[snapshot.piece[snapshot.boundary[q].cell]];
+    if (static_cast<double>(size) < kCrumb * static_cast<double>(s.quads.size())) continue;
+    for (const std::int32_t p : s.quads[q]) framed[p] = 1;
+  }
+  std::vector<std::int32_t> list;
+  for (std::size_t i = 0; i < framed.size(); ++i)
+    if (framed[i] != 0) list.push_back(static_cast<std::int32_t>(i));
+  return list;
+}
+
 }  // namespace
 
 PreviewSurface preview_surface(const Snapshot& snapshot) {
@@ -157,6 +174,7 @@ PreviewSurface preview_surface(const Snapshot& snapshot) {
   }
   if (s.quads.empty()) return s;
   s.cell = sides / static_cast<double>(s.quads.size());
+  s.framed = framed_points(s, snapshot);
   smooth_points(s, point_neighbours(classify_edges(s), s.points.size()));
   make_normals(s);
   return s;

@@ -69,6 +69,7 @@ class Run {
 
   int execute() {
     begin_ = std::chrono::steady_clock::now();
+    const InterruptGuard guard;
     say_body();
     say_warnings();
     results_.add_snapshot(0, simulation_.time(), simulation_.snapshot());
@@ -112,7 +113,6 @@ class Run {
   }
 
   void step_through() {
-    const InterruptGuard guard;
     simulation_.on_progress([this](const char* phase, int cycles, double residual) {
       bar_.phase(phase, cycles, residual);
     });

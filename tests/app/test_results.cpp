@@ -252,6 +252,14 @@ TEST(PreviewSurface, SmoothingMovesAPointByHalfACellAtMost) {
   EXPECT_LE(norm(before.hi - after.hi), 1.7320508075688773 * limit);
 }
 
+TEST(PreviewSurface, CrumbsDoNotCountForTheFrame) {
+  Snapshot s = two_cut_cells();
+  EXPECT_EQ(preview_surface(s).framed.size(), 16u);
+  for (int i = 0; i < 150; ++i)  // now the second cell has less than a hundredth of the faces
+    for (int face = 0; face < 6; ++face) s.boundary.push_back({0, face, 0});
+  EXPECT_EQ(preview_surface(s).framed.size(), 8u);
+}
+
 TEST_F(ResultsTest, PreviewIsAPictureAndTheSameEachTime) {
   if (!can_draw_preview()) GTEST_SKIP() << "built without Embree or libpng";
   PreviewOptions options;
