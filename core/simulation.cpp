@@ -75,6 +75,7 @@ struct Simulation::Impl {
   std::unique_ptr<Motion> motion;
   std::unique_ptr<Equilibrium> equilibrium;
   std::vector<double> held;  // displacement of held components
+  FrozenCrumbs crumbs;
   std::vector<std::int32_t> piece;
   std::size_t pieces = 0, cells_before = 0, hanging = 0, links_cut = 0;
   int steps = 0;
@@ -139,7 +140,11 @@ void Simulation::Impl::build_structure() {
   held = apply_supports(body.lattice(), setup.supports, level);
   hanging = count_hanging(level);
   piece = label_pieces(body, &pieces);
-  if (setup.time.mode == TimeMode::statics) expect_held(body.lattice(), level, piece, pieces);
+  if (setup.time.mode == TimeMode::statics) {
+    FrozenCrumbs now = hold_crumbs(body.lattice(), piece, pieces, level);
+    if (now.pieces > crumbs.pieces) warnings.push_back(now.warning);
+    crumbs = std::move(now);
+  }
   build_coarse_levels(hierarchy, {setup.solver.coarsest_vertices, setup.solver.max_levels,
                                   setup.solver.duplicate_cells});
   check_memory();
@@ -253,14 +258,14 @@ void Simulation::Impl::transfer(const Level& before, const std::vector<std::int3
       turned[4 * c + k] = rotations[4 * static_cast<std::size_t>(origin[c]) + k];
   }
   const Level& after = hierarchy.levels[0];
+  std::vector<double> u = transfer_values(before, values[0], after, origin);
+  for (const std::size_t k : crumbs.components) held[k] = u[k];
+  backend->write(0, state.displacement, hold(std::move(u), true));
   // A vertex that the refinement puts into a support stands still from now on.
   const bool memory_is_displacement = setup.time.scheme == TimeScheme::central;
-  const auto write = [&](int x, std::size_t i, bool is_displacement) {
-    backend->write(0, x, hold(transfer_values(before, values[i], after, origin), is_displacement));
-  };
-  write(state.displacement, 0, true);
-  write(state.velocity, 1, false);
-  write(state.memory, 2, memory_is_displacement);
+  backend->write(0, state.velocity, hold(transfer_values(before, values[1], after, origin), false));
+  backend->write(0, state.memory,
+                 hold(transfer_values(before, values[2], after, origin), memory_is_displacement));
   backend->write_rotations(turned);
 }
 

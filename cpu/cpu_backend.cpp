@@ -237,6 +237,7 @@ void CpuBackend::factor_coarsest() {
     cpu::cell_matrix(store, cell, packed);
     std::copy_n(packed, kEntries, out.data());
   });
+  if (levels_.size() > 1) coarsest_->strengthen_diagonal();
   expects(coarsest_factor_.factor(*coarsest_),
           "the stiffness matrix is singular: some part of the body can move freely; hold it with a "
           "[[support]], or use time.mode = \"dynamic\"");
