@@ -147,6 +147,18 @@ TEST(Solver, FloatingPiecesAreSolvedInDynamics) {
   }
 }
 
+// Fewer free vertices than coarse vertices over them: the coarse matrix is singular, the body held.
+TEST(Solver, SupportsMayHoldMostOfACoarseCell) {
+  for (const char* name : {"uniform", "octree1", "half_cut"}) {
+    ProblemOptions options;
+    options.holds = Holds::dense;
+    const Case c(name, kStatic, options);
+    for (const SolverMethod method :
+         {SolverMethod::cg, SolverMethod::cg_jacobi, SolverMethod::cholesky})
+      expect_solution(c, setup_of(method));
+  }
+}
+
 TEST(Solver, MergingByPlaceConvergesToTheSameSolution) {
   for (const char* name : {"half_cut", "limbs", "bar"}) {
     ProblemOptions options = Case::static_options();
@@ -249,6 +261,7 @@ TEST(Solver, HeldCompletelyIsNoProblem) {
 
 // ---- No solution --------------------------------------------------------------------------------
 
+// With one level: a coarse matrix may be singular for a body that is held, and is not judged.
 // At rest: the linearised matrix of a bent body knows no turn that leaves it without force.
 void expect_singular(const Problem& p, SolverMethod method) {
   const Vector b = p.free_vector(0, 3), zero = Vector::Zero(b.size());
@@ -262,6 +275,7 @@ void expect_singular(const Problem& p, SolverMethod method) {
 }
 
 TEST(Solver, BodiesThatMoveFreelyAreBadInput) {
+  constexpr int kOneLevel = 1 << 20;
   for (const SolverMethod method :
        {SolverMethod::cg, SolverMethod::multigrid, SolverMethod::cholesky}) {
     SCOPED_TRACE(static_cast<int>(method));
@@ -270,16 +284,17 @@ TEST(Solver, BodiesThatMoveFreelyAreBadInput) {
       ProblemOptions options;
       options.holds = Holds::none;
       options.with_oracle = false;
+      options.coarsest_vertices = kOneLevel;
       expect_singular(Problem(name, options), method);  // nothing held
       Problem hinged(name, options);                    // a point held: free to turn
       hinged.hierarchy.levels[0].fixed[0] = 7;
-      build_coarse_levels(hinged.hierarchy, {options.coarsest_vertices, 0, true});
       expect_singular(hinged, method);
     }
     for (const char* name : {"floating", "crossed"}) {  // a piece that nothing holds
       SCOPED_TRACE(name);
       ProblemOptions options = Case::static_options();
       options.with_oracle = false;
+      options.coarsest_vertices = kOneLevel;
       expect_singular(Problem(name, options), method);
     }
   }

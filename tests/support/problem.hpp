@@ -26,6 +26,7 @@ inline std::unique_ptr<Backend> make_backend(const std::string& name, int thread
 enum class Holds {
   none,
   one_side,  ///< all of the low x side
+  dense,     ///< all but one vertex in eight, which no coarse grid has
   mixed      ///< a slab that no coarse grid agrees with, and single components here and there
 };
 
@@ -129,6 +130,7 @@ struct Problem {
       const Vec3i& p = finest.point[v];
       int bits = 0;
       if (options.holds != Holds::none && p[0] == 0) bits = 7;
+      if (options.holds == Holds::dense && (p[0] & p[1] & p[2] & 1) == 0) bits = 7;
       if (options.holds == Holds::mixed && p[0] == 1) bits |= 1;
       if (options.holds == Holds::mixed && dice.roll(12) == 0) bits |= 1 << dice.roll(3);
       finest.fixed[v] = static_cast<std::uint8_t>(bits);
