@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+//
+// The kerf command from outside: exit status, messages, and what lies in the folder afterwards.
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// A block of 6 x 3 x 3 cells that stands on its low end and takes three steps.
+const std::string kBlock = R"(
+title = "block"
+[body]
+shape = "box"
+size = [0.06, 0.03, 0.03]
+resolution = 6
+[material]
+young = 1e5
+damping = [0, 0.01]
+[[support]]
+box = [[-1, -1, -1], [0.001, 1, 1]]
+[[load]]
+gravity = [0, -9.81, 0]
+[time]
+step = 0.01
+duration = 0.03
+[solver]
+threads = 1
+[output]
+preview = false
+)";
+
+/// A blade across x = `x` from below the block to y = `top`.
+std::string cut_at(double x, double top, const std::string& more = "") {
+  const auto point = [&](double y, double z) {
+    return "[" + std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(z) + "]";
+  };
+  return "[[cut]]\n" + more + "lines = [[" + point(-0.05, -1) + "," + point(-0.05, 1) + "],[" +
+         point(top, -1) + "," + point(top, 1) + "]]\n";
+}
+
+struct Outcome {
+  int status;
+  std::string out, err;
+};
+
+class KerfCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::path(testing::TempDir()) / (std::string("kerf_cli_") + info->name());
+    fs::remove_all(root_);
+    fs::create_directories(root_);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  static std::string read_all(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+
+  /// Runs `kerf ARGUMENTS` in the test's folder.
+  Outcome kerf(const std::string& arguments) {
+    const std::string command = "cd '" + root_.string() + "' && '" KERF_COMMAND "' " + arguments +
+                                " >stdout.txt 2>stderr.txt </dev/null";
+    const int status = std::system(command.c_str());
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_all(root_ / "stdout.txt"),
+                    read_all(root_ / "stderr.txt")};
+    fs::remove(root_ / "stdout.txt");
+    fs::remove(root_ / "stderr.txt");
+    return outcome;
+  }
+  Outcome run_scene(const std::string& toml, const std::string& arguments = "") {
+    std::ofstream(root_ / "scene.toml") << toml;
+    return kerf("run scene.toml --out out " + arguments);
+  }
+  std::vector<std::string> names(const fs::path& folder) {
+    std::vector<std::string> all;
+    for (const auto& entry : fs::directory_iterator(folder))
+      all.push_back(entry.path().filename().string());
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+  /// One message, this status, and no folder.
+  void expect_refused(const Outcome& outcome, int status, const std::vector<std::string>& parts) {
+    EXPECT_EQ(outcome.status, status) << outcome.err;
+    EXPECT_EQ(outcome.err.rfind("kerf: error: ", 0), 0u) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    for (const auto& part : parts)
+      EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in " << outcome.err;
+    EXPECT_FALSE(fs::exists(root_ / "out")) << "something was left behind";
+  }
+  nlohmann::json summary() { return nlohmann::json::parse(read_all(root_ / "out/summary.json")); }
+
+  fs::path root_;
+};
+
+TEST_F(KerfCommand, RunsAndLeavesItsFiles) {
+  const Outcome outcome = run_scene(kBlock + cut_at(0.035, 0.011), "--set output.every=2");
+
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "") << "no progress bar in a pipe";
+  EXPECT_EQ(names(root_ / "out"),
+            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0002.vtu", "body_0003.vtu",
+                                      "summary.json"}));
+  for (const char* part : {"folder     out", "cells      54", "steps      3", "links cut  3"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " not in " << outcome.out;
+  const auto json = summary();
+  EXPECT_EQ(json["steps"].size(), 3u);
+  EXPECT_EQ(json["title"], "block");
+  EXPECT_EQ(json["links_cut"], 3);
+  EXPECT_EQ(json["threads"], 1);
+}
+
+TEST_F(KerfCommand, SameSceneGivesTheSameHash) {
+  run_scene(kBlock + cut_at(0.035, 0.011));
+  const auto first = summary()["state_hash"];
+  EXPECT_EQ(run_scene(kBlock + cut_at(0.035, 0.011), "--quiet --set solver.threads=2").out, "");
+  EXPECT_EQ(summary()["state_hash"], first);
+}
+
+TEST_F(KerfCommand, DrawsAPictureWhereItCan) {
+  const bool ready = kerf("info").out.find("preview   ready") != std::string::npos;
+  const Outcome outcome = run_scene(kBlock, "--set output.preview=true");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(fs::exists(root_ / "out/preview.png"), ready);
+  EXPECT_EQ(outcome.err.find("KERF_PREVIEW") == std::string::npos, ready) << outcome.err;
+}
+
+TEST_F(KerfCommand, SaysWhenAPieceComesOff) {
+  const Outcome outcome = run_scene(kBlock + cut_at(0.035, 0.05, "start = 0.015\n"));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("t = 0.02 s: 2 pieces (was 1)\n"), std::string::npos) << outcome.out;
+}
+
+TEST_F(KerfCommand, ReplacesAnEarlierRunAndNothingElse) {
+  run_scene(kBlock);
+  std::ofstream(root_ / "out/notes.txt") << "mine";
+  EXPECT_EQ(run_scene(kBlock, "--set time.duration=0.02").status, 0);
+  EXPECT_EQ(names(root_ / "out"),
+            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0001.vtu", "body_0002.vtu",
+                                      "notes.txt", "summary.json"}));
+}
+
+TEST_F(KerfCommand, RefusesBadScenes) {
+  expect_refused(kerf("run none.toml --out out"), 2, {"none.toml"});
+  expect_refused(run_scene(kBlock + "[materail]\n"), 2, {"scene.toml:", "'material'"});
+  expect_refused(run_scene(kBlock, "--set material.poisson=0.5"), 2,
+                 {"--set material.poisson=0.5: ", "0.5"});
+  expect_refused(run_scene(kBlock, "--set material.young=nan"), 2, {"finite"});
+  expect_refused(run_scene(kBlock, "--set time.step=0"), 2, {"--set time.step=0"});
+  expect_refused(run_scene(kBlock, "--set solver.precision=mixed"), 2,
+                 {"--set solver.precision=mixed: ", "\"double\""});
+  expect_refused(run_scene("[body]\nshape = \"box\"\nsize = [1,1,1]\n[time]\nmode = \"static\"\n"), 2,
+                 {"scene.toml:5: ", "[[support]]"});
+  expect_refused(run_scene(kBlock + cut_at(0.5, 0.1, "state = \"reference\"\n")), 2,
+                 {"scene.toml:", "misses"});
+}
+
+TEST_F(KerfCommand, RefusesBadMeshes) {
+  const auto with_mesh = [&](const std::string& name, const std::string& content) {
+    std::ofstream(root_ / name) << content;
+    return run_scene("[body]\nmesh = \"" + name + "\"\nresolution = 8\n");
+  };
+  expect_refused(run_scene("[body]\nmesh = \"none.off\"\n"), 2, {"scene.toml:2: ", "none.off"});
+  expect_refused(with_mesh("empty.off", ""), 2, {"scene.toml:2: ", "empty.off"});
+  expect_refused(with_mesh("broken.off", "OFF\n4 4 0\n0 0"), 2, {"broken.off"});
+  expect_refused(with_mesh("text.off", "not a mesh"), 2, {"text.off"});
+  // One triangle encloses nothing.
+  expect_refused(with_mesh("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), 2, {"flat.off"});
+}
+
+TEST_F(KerfCommand, RefusesABodyBeyondTheMemoryBeforeAllocating) {
+  const Outcome outcome = run_scene(kBlock, "--set body.resolution=16384");
+  expect_refused(outcome, 4, {"scene.toml: ", "resolution", " of memory"});
+}
+
+TEST_F(KerfCommand, RefusesABackendThatIsNotThere) {
+  if (kerf("info").out.find("cuda      not built") == std::string::npos)
+    GTEST_SKIP() << "the CUDA backend is built";
+  expect_refused(run_scene(kBlock, "--set solver.backend=cuda"), 4, {"KERF_CUDA=ON"});
+}
+
+TEST_F(KerfCommand, RefusesAFolderThatCannotBeWritten) {
+  std::ofstream(root_ / "scene.toml") << kBlock;
+  std::ofstream(root_ / "taken") << "x";
+  expect_refused(kerf("run scene.toml --out taken"), 2, {"taken", "file"});
+  expect_refused(kerf("run scene.toml --out taken/inner"), 2, {"taken/inner"});
+  expect_refused(kerf("run scene.toml --out /proc/kerf"), 2, {"/proc/kerf"});
+  EXPECT_EQ(read_all(root_ / "taken"), "x");
+}
+
+TEST_F(KerfCommand, LeavesNothingWhenTheRunItselfFails) {
+  // In static mode the piece that the blade takes off is held by nothing.
+  const Outcome outcome = run_scene(kBlock + cut_at(0.035, 0.05), "--set time.mode=static --quiet");
+  expect_refused(outcome, 2, {"piece"});
+}
+
+TEST_F(KerfCommand, KeepsResultsWhenABladeMissed) {
+  const Outcome outcome = run_scene(kBlock + cut_at(0.5, 0.1));
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_TRUE(fs::exists(root_ / "out/summary.json"));
+  for (const char* part : {"kerf: error: scene.toml:21: cut 1 ", " 0.439", "m apart"})
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in " << outcome.err;
+}
+
+TEST_F(KerfCommand, KeepsResultsWhenNotConverged) {
+  const Outcome outcome =
+      run_scene(kBlock, "--set solver.method=multigrid --set solver.max_cycles=1 "
+                        "--set solver.tolerance=1e-14 --set solver.coarsest_vertices=30");
+  EXPECT_EQ(outcome.status, 3) << outcome.err;
+  EXPECT_NE(outcome.err.find("kerf: error: not converged in 3 of 3 steps"), std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(summary()["converged"], false);
+}
+
+TEST_F(KerfCommand, CommandLineErrorsAreBadInput) {
+  for (const char* arguments : {"", "walk", "run", "run scene.toml", "run scene.toml --out",
+                                "run scene.toml --out out --fast", "check"}) {
+    const Outcome outcome = kerf(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    EXPECT_NE(outcome.err, "") << arguments;
+  }
+  EXPECT_EQ(kerf("--help").status, 0);
+  EXPECT_EQ(kerf("run --help").status, 0);
+  EXPECT_EQ(kerf("--version").out.rfind("kerf ", 0), 0u);
+}
+
+TEST_F(KerfCommand, CheckSaysWhatARunNeedsAndWritesNothing) {
+  std::ofstream(root_ / "scene.toml") << kBlock;
+  const Outcome outcome = kerf("check scene.toml --set body.size=[0.06,0.03,0.06]");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  for (const char* part : {"6 x 3 x 6 finest cells", "108", "bytes a cell", "3 steps, 0 cuts"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " not in " << outcome.out;
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"scene.toml"}));
+  EXPECT_EQ(kerf("check scene.toml --set body.shape=blob").status, 2);
+}
+
+TEST_F(KerfCommand, InfoNamesVersionAndBackends) {
+  const Outcome outcome = kerf("info");
+  EXPECT_EQ(outcome.status, 0);
+  for (const char* part : {"kerf      ", "commit", "cpu       ready", "cuda ", "toml++"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " not in " << outcome.out;
+}
+
+TEST_F(KerfCommand, AnInterruptKeepsTheStepsSoFar) {
+  std::ofstream(root_ / "scene.toml") << kBlock;
+  const std::string scene = (root_ / "scene.toml").string(), out = (root_ / "out").string();
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    std::freopen("/dev/null", "w", stderr);
+    execl(KERF_COMMAND, "kerf", "run", scene.c_str(), "--out", out.c_str(), "--quiet", "--set",
+          "time.duration=1e4", "--set", "output.every=1000000", nullptr);
+    _exit(127);
+  }
+  // The first body file shows that the run has begun and listens.
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!fs::exists(root_ / "out/.body_0000.vtu.partial") &&
+         std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_EQ(summary()["interrupted"], true);
+  EXPECT_TRUE(fs::exists(root_ / "out/body_0000.vtu"));
+}
+
+}  // namespace
