@@ -9,9 +9,12 @@ namespace kerf {
 
 const char* precision_name(Precision precision) {
   switch (precision) {
-    case Precision::mixed: return "mixed";
-    case Precision::single: return "single";
-    default: return "double";
+    case Precision::mixed:
+      return "mixed";
+    case Precision::single:
+      return "single";
+    default:
+      return "double";
   }
 }
 
@@ -21,8 +24,8 @@ std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
                "\": only \"double\" is available in this version"));
   if (solver.backend == "cpu" || solver.backend == "auto")
     return make_cpu_backend(CpuOptions{.threads = solver.threads});
-  expects(solver.backend == "cuda",
-          text("solver.backend = \"", solver.backend, "\": expected \"cpu\", \"cuda\" or \"auto\""));
+  expects(solver.backend == "cuda", text("solver.backend = \"", solver.backend,
+                                         "\": expected \"cpu\", \"cuda\" or \"auto\""));
   throw Error(ErrorKind::unavailable,
               "this build has no CUDA backend; configure with -DKERF_CUDA=ON or set backend = "
               "\"cpu\"");

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "app/commands.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <new>
-
-#include <fmt/format.h>
 
 #include "app/backends.hpp"
 #include "app/session.hpp"
@@ -38,7 +38,8 @@ int info_command() {
   fmt::print("kerf      {} (commit {})\n", kVersion, kCommit);
   fmt::print("build     {}, {}, {}\n", kBuildType, kCompiler, kSystem);
   for (const auto& [name, state] : backend_states()) fmt::print("{:<9} {}\n", name, state);
-  fmt::print("preview   {}\n", kHasPreview ? "ready" : "not built; configure with -DKERF_PREVIEW=ON");
+  fmt::print("preview   {}\n",
+             kHasPreview ? "ready" : "not built; configure with -DKERF_PREVIEW=ON");
   fmt::print("libraries {}\n", kLibraries);
   return kDone;
 }

@@ -14,8 +14,8 @@ enum ExitStatus : int {
   kDone = 0,
   kInternal = 1,
   kBadInput = 2,
-  kNotConverged = 3,  ///< results are kept
-  kUnavailable = 4,   ///< no such backend, or out of memory
+  kNotConverged = 3,   ///< results are kept
+  kUnavailable = 4,    ///< no such backend, or out of memory
   kInterrupted = 130,  ///< results so far are kept
 };
 

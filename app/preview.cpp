@@ -176,9 +176,9 @@ Camera fit_camera(const std::vector<Vec>& points, const Vec& back, const Vec& wo
   float distance = 0.1f;
   for (const auto& p : points) {
     const float z = dot(p, back);
-    distance = std::max(
-        {distance, z + std::abs(dot(p, camera.right) - cx) / (kMargin * camera.half_width),
-         z + std::abs(dot(p, camera.up) - cy) / (kMargin * kHalfHeight)});
+    distance =
+        std::max({distance, z + std::abs(dot(p, camera.right) - cx) / (kMargin * camera.half_width),
+                  z + std::abs(dot(p, camera.up) - cy) / (kMargin * kHalfHeight)});
   }
   camera.eye = cx * camera.right + cy * camera.up + distance * back;
   return camera;
@@ -206,9 +206,9 @@ Camera choose_camera(const RayScene& scene, const Vec& up, float aspect) {
       int seen = 0;
       for (int y = 0; y < kScoutHeight; ++y)
         for (int x = 0; x < kScoutWidth; ++x) {
-          const auto hit = scene.trace(
-              camera.eye, camera.ray((static_cast<float>(x) + 0.5f) / kScoutWidth,
-                                     (static_cast<float>(y) + 0.5f) / kScoutHeight));
+          const auto hit =
+              scene.trace(camera.eye, camera.ray((static_cast<float>(x) + 0.5f) / kScoutWidth,
+                                                 (static_cast<float>(y) + 0.5f) / kScoutHeight));
           seen += hit.found && hit.cut_id > 0;
         }
       if (seen > most) {
@@ -259,10 +259,12 @@ class Painter {
     const int n = options_.samples;
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i) {
-        const float x = (static_cast<float>(px) + (static_cast<float>(i) + 0.5f) / static_cast<float>(n)) /
-                        static_cast<float>(options_.width);
-        const float y = (static_cast<float>(py) + (static_cast<float>(j) + 0.5f) / static_cast<float>(n)) /
-                        static_cast<float>(options_.height);
+        const float x =
+            (static_cast<float>(px) + (static_cast<float>(i) + 0.5f) / static_cast<float>(n)) /
+            static_cast<float>(options_.width);
+        const float y =
+            (static_cast<float>(py) + (static_cast<float>(j) + 0.5f) / static_cast<float>(n)) /
+            static_cast<float>(options_.height);
         sum += shade(camera_.ray(x, y), y, samples);
       }
     return sum * (1.0f / static_cast<float>(n * n));
@@ -284,8 +286,8 @@ class Painter {
     const float soft = std::max(0.0f, dot(hit.normal, fill_));
     const Vec half = unit(key_ - direction);
     const float shine = 0.05f * lit * std::pow(std::max(0.0f, dot(hit.normal, half)), 24.0f);
-    const Vec light = 0.70f * ambient + lit * Vec{0.80f, 0.77f, 0.72f} +
-                      0.13f * soft * Vec{0.85f, 0.92f, 1.0f};
+    const Vec light =
+        0.70f * ambient + lit * Vec{0.80f, 0.77f, 0.72f} + 0.13f * soft * Vec{0.85f, 0.92f, 1.0f};
     return times(base, light) + Vec{shine, shine, shine};
   }
 
@@ -354,8 +356,9 @@ std::vector<std::uint8_t> paint(const Painter& painter, const PreviewOptions& op
     for (int y = next++; y < options.height; y = next++)
       for (int x = 0; x < options.width; ++x) {
         const Vec colour = painter.pixel(x, y);
-        const std::size_t at = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +
-                                    static_cast<std::size_t>(x));
+        const std::size_t at =
+            3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +
+                 static_cast<std::size_t>(x));
         for (int d = 0; d < 3; ++d) rgb[at + static_cast<std::size_t>(d)] = encode(colour[d]);
       }
   };

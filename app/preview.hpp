@@ -13,7 +13,7 @@ struct PreviewOptions {
   Vec3d up{0, 1, 0};  ///< points up in the picture; need not be of unit length
   int width = 1200, height = 900;
   int samples = 2;     ///< per pixel and direction
-  int occlusion = 12;   ///< rays for ambient light, per sample
+  int occlusion = 12;  ///< rays for ambient light, per sample
 };
 
 /// Whether this build can draw.

@@ -105,11 +105,11 @@ void make_normals(PreviewSurface& s) {
   s.normal_of.resize(s.quads.size());
   for (std::size_t q = 0; q < s.quads.size(); ++q) {
     const auto& quad = s.quads[q];
-    const Vec3d area = cross(s.points[quad[2]] - s.points[quad[0]],
-                             s.points[quad[3]] - s.points[quad[1]]);
+    const Vec3d area =
+        cross(s.points[quad[2]] - s.points[quad[0]], s.points[quad[3]] - s.points[quad[1]]);
     for (std::size_t k = 0; k < 4; ++k) {
-      const auto [it, added] = index.try_emplace({quad[k], s.cut_id[q]},
-                                                 static_cast<std::int32_t>(s.normals.size()));
+      const auto [it, added] =
+          index.try_emplace({quad[k], s.cut_id[q]}, static_cast<std::int32_t>(s.normals.size()));
       if (added) s.normals.emplace_back();
       s.normals[it->second] += area;
       s.normal_of[q][k] = it->second;

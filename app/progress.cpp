@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "app/progress.hpp"
 
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-
-#include <fmt/format.h>
 
 namespace kerf {
 namespace {
@@ -40,7 +39,8 @@ std::string progress_line(const ProgressState& s, int width) {
   if (s.cycles > 0) line += fmt::format("  {} cycles  res {:.1e}", s.cycles, s.residual);
   if (s.seconds_left >= 0) line += fmt::format("  {} left", duration_text(s.seconds_left));
   if (!s.phase.empty()) line += "  " + s.phase;
-  if (static_cast<int>(line.size()) > width) line.resize(static_cast<std::size_t>(std::max(0, width)));
+  if (static_cast<int>(line.size()) > width)
+    line.resize(static_cast<std::size_t>(std::max(0, width)));
   return line;
 }
 

@@ -12,13 +12,13 @@ namespace kerf {
 
 /// The line for a finished or running step; at most `width` columns.
 struct ProgressState {
-  int step = 0, steps = 0;       ///< finished and planned
-  double time = 0;               ///< s, of the simulation
-  double seconds_per_step = 0;   ///< of the last step
-  double seconds_left = -1;      ///< estimate; negative: not known yet
+  int step = 0, steps = 0;      ///< finished and planned
+  double time = 0;              ///< s, of the simulation
+  double seconds_per_step = 0;  ///< of the last step
+  double seconds_left = -1;     ///< estimate; negative: not known yet
   int cycles = 0;
   double residual = 0;
-  std::string phase;             ///< of the running step; empty between steps
+  std::string phase;  ///< of the running step; empty between steps
 };
 std::string progress_line(const ProgressState& state, int width);
 

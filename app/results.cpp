@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "app/results.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "app/version.hpp"
@@ -27,8 +27,8 @@ std::string partial_name(const std::string& name) { return "." + name + kPartial
 bool is_body_file(const std::string& name) {
   if (!name.starts_with("body_") || !name.ends_with(".vtu")) return false;
   const std::string digits = name.substr(5, name.size() - 9);
-  return digits.size() >= 4 && std::all_of(digits.begin(), digits.end(),
-                                           [](char c) { return c >= '0' && c <= '9'; });
+  return digits.size() >= 4 &&
+         std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 bool is_ours(const std::string& name) {

@@ -66,9 +66,9 @@ class ResultsFolder {
   std::filesystem::path folder_;
   OutputSettings settings_;
   bool committed_ = false;
-  std::vector<std::filesystem::path> created_;           // folders that were not there before
-  std::vector<std::string> files_;                       // names, written as partial so far
-  std::vector<std::pair<double, std::string>> series_;   // time and body file
+  std::vector<std::filesystem::path> created_;          // folders that were not there before
+  std::vector<std::string> files_;                      // names, written as partial so far
+  std::vector<std::pair<double, std::string>> series_;  // time and body file
 };
 
 }  // namespace kerf

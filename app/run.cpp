@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -6,8 +7,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-
-#include <fmt/format.h>
 
 #include "app/backends.hpp"
 #include "app/commands.hpp"
@@ -64,8 +63,12 @@ Box3 deformed_box(const Snapshot& s) {
 class Run {
  public:
   Run(const Scene& scene, const RunOptions& options, Simulation& simulation, ResultsFolder& results)
-      : scene_(scene), options_(options), simulation_(simulation), results_(results),
-        bar_(!options.quiet), hits_(scene.setup.cuts.size(), 0) {}
+      : scene_(scene),
+        options_(options),
+        simulation_(simulation),
+        results_(results),
+        bar_(!options.quiet),
+        hits_(scene.setup.cuts.size(), 0) {}
 
   int execute() {
     begin_ = std::chrono::steady_clock::now();
@@ -152,8 +155,7 @@ class Run {
   void draw() {
     if (!scene_.output.preview) return;
     try {
-      draw_preview(results_.add_file("preview.png"), snapshot_,
-                   {.up = up_direction(scene_.setup)});
+      draw_preview(results_.add_file("preview.png"), snapshot_, {.up = up_direction(scene_.setup)});
       drawn_ = true;
     } catch (const Error& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");
@@ -187,8 +189,7 @@ class Run {
     summary_.precision = precision_name(scene_.setup.solver.precision);
     summary_.state_hash = s.state_hash();
     summary_.warnings.insert(summary_.warnings.begin(), s.warnings().begin(), s.warnings().end());
-    if (!summary_.interrupted)
-      missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
+    if (!summary_.interrupted) missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
     if (!missed_.empty()) summary_.warnings.push_back(missed_);
   }
 
@@ -209,8 +210,8 @@ class Run {
       complain(fmt::format(
           "error: not converged in {} of {} steps, first in step {}: linear residual {:.2e}, "
           "residual {:.2e} after {} cycles; results are kept",
-          not_converged_, summary_.steps.size(), step.step, step.linear_residual,
-          step.residual, step.cycles));
+          not_converged_, summary_.steps.size(), step.step, step.linear_residual, step.residual,
+          step.cycles));
     }
     if (summary_.interrupted) {
       complain(fmt::format("interrupted after step {} of {}; results so far are kept",

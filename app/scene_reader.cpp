@@ -159,8 +159,8 @@ Support read_support(SceneTable& table) {
   }
   for (int d = 0; d < 3; ++d)
     if (!support.held[static_cast<std::size_t>(d)] && support.displacement[d] != 0)
-      table.fail("displacement", text("[[support]] displaces along ", "xyz"[d],
-                                      ", which is not among its 'axes'"));
+      table.fail("displacement",
+                 text("[[support]] displaces along ", "xyz"[d], ", which is not among its 'axes'"));
   table.finish();
   return support;
 }
@@ -234,8 +234,8 @@ CutSetup read_cut(SceneTable& table, const SimulationSetup& setup) {
   if (lines) cut.lines = read_lines(*lines);
   if (mesh) cut.mesh = read_scene_mesh(*mesh);
   if (setup.time.mode == TimeMode::dynamic && cut.start >= setup.time.duration)
-    table.fail("start", text("[[cut]] starts at ", cut.start, " s, but the run ends at duration = ",
-                             setup.time.duration, " s"));
+    table.fail("start", text("[[cut]] starts at ", cut.start,
+                             " s, but the run ends at duration = ", setup.time.duration, " s"));
   const Box3 blade = blade_box(cut), body = setup.body.solid->bounds();
   if (!cut.deformed && !blade.overlaps(body))
     table.fail(text("the blade misses the body: it sweeps ", show(blade), ", the body fills ",
@@ -244,7 +244,8 @@ CutSetup read_cut(SceneTable& table, const SimulationSetup& setup) {
 }
 
 void read_time(SceneTable& table, TimeSetup& time) {
-  table.read_choice("mode", time.mode, {{"dynamic", TimeMode::dynamic}, {"static", TimeMode::statics}});
+  table.read_choice("mode", time.mode,
+                    {{"dynamic", TimeMode::dynamic}, {"static", TimeMode::statics}});
   table.read_choice("scheme", time.scheme,
                     {{"newmark", TimeScheme::newmark}, {"central", TimeScheme::central}});
   table.read("step", time.step, kPositive);
@@ -289,10 +290,9 @@ void read_solver(SceneTable& table, SolverSetup& solver) {
   table.read("coarsest_vertices", solver.coarsest_vertices, 1);
   table.read("max_levels", solver.max_levels, 0);
   table.read("duplicate", solver.duplicate_cells);
-  table.read_choice("precision", solver.precision,
-                    {{"double", Precision::double_},
-                     {"mixed", Precision::mixed},
-                     {"single", Precision::single}});
+  table.read_choice(
+      "precision", solver.precision,
+      {{"double", Precision::double_}, {"mixed", Precision::mixed}, {"single", Precision::single}});
   table.read_choice<std::string>("backend", solver.backend,
                                  {{"cpu", "cpu"}, {"cuda", "cuda"}, {"auto", "auto"}});
   table.read("threads", solver.threads, 0);
@@ -377,8 +377,7 @@ Scene read_scene(const fs::path& file, const std::vector<std::string>& overrides
     throw Error(ErrorKind::bad_input, text(file.string(), ": is a folder, not a scene file"));
   std::ifstream in(file, std::ios::binary);
   if (!in)
-    throw Error(ErrorKind::bad_input,
-                text(file.string(), ": cannot be read; is the path right?"));
+    throw Error(ErrorKind::bad_input, text(file.string(), ": cannot be read; is the path right?"));
   const std::string toml{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   return read_scene_text(toml, file, overrides);
 }

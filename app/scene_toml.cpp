@@ -25,13 +25,20 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 const char* type_name(const toml::node& node) {
   switch (node.type()) {
-    case toml::node_type::table: return "a table";
-    case toml::node_type::array: return "an array";
-    case toml::node_type::string: return "a string";
-    case toml::node_type::integer: return "an integer";
-    case toml::node_type::floating_point: return "a number";
-    case toml::node_type::boolean: return "a boolean";
-    default: return "a date or time";
+    case toml::node_type::table:
+      return "a table";
+    case toml::node_type::array:
+      return "an array";
+    case toml::node_type::string:
+      return "a string";
+    case toml::node_type::integer:
+      return "an integer";
+    case toml::node_type::floating_point:
+      return "a number";
+    case toml::node_type::boolean:
+      return "a boolean";
+    default:
+      return "a date or time";
   }
 }
 
@@ -93,7 +100,8 @@ toml::table parse_override_value(const std::string& argument, const std::string&
 }  // namespace
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& names) {
-  const std::size_t limit = std::max<std::size_t>(2, name.size() / 3);  // typing errors, not guesses
+  const std::size_t limit =
+      std::max<std::size_t>(2, name.size() / 3);  // typing errors, not guesses
   std::size_t best = limit + 1;
   std::string nearest;
   for (const auto& candidate : names) {
@@ -112,8 +120,8 @@ SceneSource::SceneSource(const std::string& toml, std::filesystem::path file,
   try {
     root_ = toml::parse(toml, file_.string());
   } catch (const toml::parse_error& error) {
-    throw Error(ErrorKind::bad_input, text(file_.string(), ":", error.source().begin.line, ": ",
-                                           error.description()));
+    throw Error(ErrorKind::bad_input,
+                text(file_.string(), ":", error.source().begin.line, ": ", error.description()));
   }
   for (const auto& argument : overrides) apply(argument);
 }
@@ -136,17 +144,18 @@ void SceneSource::apply(const std::string& argument) {
     const bool last = i + 1 == parts.size();
     if (auto* array = node->as_array()) {
       const auto index = parse_index(parts[i]);
-      if (!index) throw bad(text("'", walked, "' is a list; expected a number, not '", parts[i], "'"));
+      if (!index)
+        throw bad(text("'", walked, "' is a list; expected a number, not '", parts[i], "'"));
       if (*index >= array->size())
         throw bad(text("'", walked, "' has ", array->size(), " entries, counted from 0"));
-      if (last) array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(*index), *value.get("v"));
+      if (last)
+        array->replace(array->cbegin() + static_cast<std::ptrdiff_t>(*index), *value.get("v"));
       node = array->get(*index);
     } else if (auto* table = node->as_table()) {
       if (last) {
         table->insert_or_assign(parts[i], *value.get("v"));
       } else if (table->get(parts[i]) == nullptr) {
-        if (parse_index(parts[i + 1]))
-          throw bad(text("the scene has no [[", parts[i], "]]"));
+        if (parse_index(parts[i + 1])) throw bad(text("the scene has no [[", parts[i], "]]"));
         table->insert_or_assign(parts[i], toml::table{});
       }
       node = table->get(parts[i]);
@@ -191,8 +200,8 @@ double SceneValue::number(const Range& range) const {
   if (!node->is_number()) fail(text("must be a number, not ", type_name(*node)));
   const double value = *node->value<double>();
   if (!std::isfinite(value)) fail("must be finite, not nan or inf");
-  const bool inside = range.open ? value > range.lo && value < range.hi
-                                 : value >= range.lo && value <= range.hi;
+  const bool inside =
+      range.open ? value > range.lo && value < range.hi : value >= range.lo && value <= range.hi;
   if (!inside) fail(text("must be ", range.text, ", not ", value));
   return value;
 }
@@ -236,7 +245,10 @@ Box3 SceneValue::box() const {
 
 SceneTable::SceneTable(const toml::table& table, const SceneSource& source, std::string path,
                        std::string label, std::map<std::string, std::string>& places)
-    : table_(&table), source_(&source), path_(std::move(path)), label_(std::move(label)),
+    : table_(&table),
+      source_(&source),
+      path_(std::move(path)),
+      label_(std::move(label)),
       places_(&places) {
   (*places_)[path_] = place();
 }
@@ -261,9 +273,9 @@ SceneValue SceneTable::require(std::string_view key) {
     for (const auto& [given, node] : *table_)  // a mistyped name is the likelier cause
       if (edit_distance(given.str(), key) <= 2 &&
           std::find(known_.begin(), known_.end(), given.str()) == known_.end())
-        source_->fail(key_path(given.str()), given.source(),
-                      text("unknown key '", given.str(), "' in ", label_, "; did you mean '", key,
-                           "'?"));
+        source_->fail(
+            key_path(given.str()), given.source(),
+            text("unknown key '", given.str(), "' in ", label_, "; did you mean '", key, "'?"));
     fail(text(label_, " needs '", key, "'"));
   }
   return *value;
@@ -290,11 +302,11 @@ std::optional<SceneTable> SceneTable::table(std::string_view key, std::string la
   if (!value) return {};
   const auto* inner = value->node->as_table();
   if (inner == nullptr)
-    source_->fail(value->path, value->node->source(),
-                  value->node->is_array_of_tables()
-                      ? text(label, " may be given only once; write ", label, " instead of [",
-                             label, "]")
-                      : text(label, " must be a table, not ", type_name(*value->node)));
+    source_->fail(
+        value->path, value->node->source(),
+        value->node->is_array_of_tables()
+            ? text(label, " may be given only once; write ", label, " instead of [", label, "]")
+            : text(label, " must be a table, not ", type_name(*value->node)));
   return SceneTable(*inner, *source_, value->path, std::move(label), *places_);
 }
 

@@ -6,6 +6,8 @@
 // of valid names cannot differ from what the reader understands.
 #pragma once
 
+#include <toml++/toml.h>
+
 #include <filesystem>
 #include <initializer_list>
 #include <limits>
@@ -15,8 +17,6 @@
 #include <string_view>
 #include <utility>
 #include <vector>
-
-#include <toml++/toml.h>
 
 #include "core/base/error.hpp"
 #include "core/geometry/vec.hpp"
@@ -30,7 +30,7 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
 struct Range {
   double lo = -std::numeric_limits<double>::infinity();
   double hi = std::numeric_limits<double>::infinity();
-  bool open = true;               ///< whether the ends are excluded
+  bool open = true;  ///< whether the ends are excluded
   std::string_view text = "finite";
 };
 inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "app/session.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include <fmt/format.h>
 
 #include "app/backends.hpp"
 #include "core/base/error.hpp"
@@ -63,12 +63,13 @@ std::string missed_blades(const Scene& scene, const std::vector<std::size_t>& hi
       for (const auto& p : line) blade.add(p);
     for (const auto& p : cut.mesh.points) blade.add(p);
     const double distance = gap(blade, body);
-    all += fmt::format("{}{}: cut {} met no link of the body: the blade sweeps {}, the body fills "
-                       "{}{}",
-                       all.empty() ? "" : "\n", scene.place_of(fmt::format("cut.{}", i)), i + 1,
-                       show(blade), show(body),
-                       distance > 0 ? fmt::format(", {:.4g} m apart", distance)
-                                    : std::string("; the boxes overlap, the surfaces do not"));
+    all += fmt::format(
+        "{}{}: cut {} met no link of the body: the blade sweeps {}, the body fills "
+        "{}{}",
+        all.empty() ? "" : "\n", scene.place_of(fmt::format("cut.{}", i)), i + 1, show(blade),
+        show(body),
+        distance > 0 ? fmt::format(", {:.4g} m apart", distance)
+                     : std::string("; the boxes overlap, the surfaces do not"));
   }
   return all;
 }

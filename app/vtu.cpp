@@ -14,7 +14,8 @@
 namespace kerf {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "arrays are written as they lie in memory");
 static_assert(sizeof(Vec3d) == 3 * sizeof(double) && sizeof(Mat3d) == 9 * sizeof(double));
 
 constexpr std::uint8_t kVtkHexahedron = 12;
@@ -28,9 +29,9 @@ class AppendedArrays {
   std::string element(const char* type, const char* name, int components,
                       const std::vector<T>& values) {
     const std::size_t bytes = values.size() * sizeof(T);
-    std::string xml = text("        <DataArray type=\"", type, "\" Name=\"", name,
-                           "\" NumberOfComponents=\"", components,
-                           "\" format=\"appended\" offset=\"", offset_, "\"/>\n");
+    std::string xml =
+        text("        <DataArray type=\"", type, "\" Name=\"", name, "\" NumberOfComponents=\"",
+             components, "\" format=\"appended\" offset=\"", offset_, "\"/>\n");
     blocks_.push_back(std::as_bytes(std::span(values)));
     offset_ += sizeof(std::uint64_t) + bytes;
     return xml;

@@ -2,7 +2,6 @@
 //
 // The kerf command from outside: exit status, messages, and what lies in the folder afterwards.
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 namespace {
@@ -163,8 +163,8 @@ TEST_F(KerfCommand, RefusesBadScenes) {
   expect_refused(run_scene(kBlock, "--set time.step=0"), 2, {"--set time.step=0"});
   expect_refused(run_scene(kBlock, "--set solver.precision=mixed"), 2,
                  {"--set solver.precision=mixed: ", "\"double\""});
-  expect_refused(run_scene("[body]\nshape = \"box\"\nsize = [1,1,1]\n[time]\nmode = \"static\"\n"), 2,
-                 {"scene.toml:5: ", "[[support]]"});
+  expect_refused(run_scene("[body]\nshape = \"box\"\nsize = [1,1,1]\n[time]\nmode = \"static\"\n"),
+                 2, {"scene.toml:5: ", "[[support]]"});
   expect_refused(run_scene(kBlock + cut_at(0.5, 0.1, "state = \"reference\"\n")), 2,
                  {"scene.toml:", "misses"});
 }
@@ -179,7 +179,8 @@ TEST_F(KerfCommand, RefusesBadMeshes) {
   expect_refused(with_mesh("broken.off", "OFF\n4 4 0\n0 0"), 2, {"broken.off"});
   expect_refused(with_mesh("text.off", "not a mesh"), 2, {"text.off"});
   // One triangle encloses nothing.
-  expect_refused(with_mesh("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), 2, {"flat.off"});
+  expect_refused(with_mesh("flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), 2,
+                 {"flat.off"});
 }
 
 TEST_F(KerfCommand, RefusesABodyBeyondTheMemoryBeforeAllocating) {
@@ -218,8 +219,9 @@ TEST_F(KerfCommand, KeepsResultsWhenABladeMissed) {
 
 TEST_F(KerfCommand, KeepsResultsWhenNotConverged) {
   const Outcome outcome =
-      run_scene(kBlock, "--set solver.method=multigrid --set solver.max_cycles=1 "
-                        "--set solver.tolerance=1e-14 --set solver.coarsest_vertices=30");
+      run_scene(kBlock,
+                "--set solver.method=multigrid --set solver.max_cycles=1 "
+                "--set solver.tolerance=1e-14 --set solver.coarsest_vertices=30");
   EXPECT_EQ(outcome.status, 3) << outcome.err;
   EXPECT_NE(outcome.err.find("kerf: error: not converged in 3 of 3 steps"), std::string::npos)
       << outcome.err;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "app/preview.hpp"
@@ -72,9 +72,9 @@ std::vector<T> vtu_array(const std::string& vtu, const std::string& name) {
 class ResultsTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) / ("kerf_results_" + std::string(testing::UnitTest::GetInstance()
-                                                                              ->current_test_info()
-                                                                              ->name()));
+    root_ = fs::path(testing::TempDir()) /
+            ("kerf_results_" +
+             std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
     fs::remove_all(root_);
     fs::create_directories(root_);
   }
@@ -150,9 +150,10 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
   const auto json = nlohmann::json::parse(to_json(summary));
 
   for (const char* key :
-       {"scene", "cells", "cells_before_cuts", "vertices", "unknowns", "hanging", "levels", "pieces",
-        "seconds", "steps", "peak_bytes", "bytes_per_cell", "backend", "threads", "precision",
-        "version", "commit", "state_hash", "links_cut", "warnings"})
+       {"scene",     "cells",   "cells_before_cuts", "vertices", "unknowns",   "hanging",
+        "levels",    "pieces",  "seconds",           "steps",    "peak_bytes", "bytes_per_cell",
+        "backend",   "threads", "precision",         "version",  "commit",     "state_hash",
+        "links_cut", "warnings"})
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_EQ(json["state_hash"], "0000000000000abc");
   EXPECT_EQ(json["levels"], 2);
@@ -283,8 +284,8 @@ TEST(Progress, LineFitsAndSaysWhatCounts) {
   state.residual = 3e-7;
   state.seconds_left = 125;
   const std::string line = progress_line(state, 200);
-  for (const char* part : {"[##########----------]", "5/10", "0.50 s/step", "12 cycles", "3.0e-07",
-                           "2:05 min left"})
+  for (const char* part :
+       {"[##########----------]", "5/10", "0.50 s/step", "12 cycles", "3.0e-07", "2:05 min left"})
     EXPECT_NE(line.find(part), std::string::npos) << part << " not in " << line;
   EXPECT_EQ(progress_line(state, 30).size(), 30u);
 }

@@ -202,7 +202,7 @@ TEST(Scene, MistypedValueNamesNearestValue) {
 
 struct BadScene {
   const char* name;
-  std::string toml;              // behind kBox, which ends in line 4
+  std::string toml;                // behind kBox, which ends in line 4
   std::vector<std::string> parts;  // of the message
 };
 
@@ -243,13 +243,15 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"FormatPvdAlone", "[output]\nformats = [\"pvd\"]\n", {":6: ", "\"vtu\" too"}},
         BadScene{"StaticFree", "[time]\nmode = \"static\"\n", {":6: ", "[[support]]"}},
         BadScene{"SupportNoBox", "[[support]]\naxes = \"x\"\n", {":5: ", "needs 'box'"}},
-        BadScene{"SupportBoxTurned", "[[support]]\nbox = [[1,0,0],[0,1,1]]\n", {":6: ", "low corner"}},
+        BadScene{
+            "SupportBoxTurned", "[[support]]\nbox = [[1,0,0],[0,1,1]]\n", {":6: ", "low corner"}},
         BadScene{"SupportAxes", "[[support]]\nbox = [[0,0,0],[1,1,1]]\naxes = \"xw\"\n", {":7: "}},
         BadScene{"SupportAxisNotHeld",
                  "[[support]]\nbox = [[0,0,0],[1,1,1]]\naxes = \"x\"\ndisplacement = [0,1,0]\n",
                  {":8: ", "along y"}},
         BadScene{"LoadNone", "[[load]]\n", {":5: ", "exactly one"}},
-        BadScene{"LoadTwo", "[[load]]\ngravity = [0,0,1]\nforce = [1,0,0]\n", {":5: ", "exactly one"}},
+        BadScene{
+            "LoadTwo", "[[load]]\ngravity = [0,0,1]\nforce = [1,0,0]\n", {":5: ", "exactly one"}},
         BadScene{"LoadNoForce", "[[load]]\nbox = [[0,0,0],[1,1,1]]\n", {":5: ", "'force'"}},
         BadScene{"LoadGravityTwo", "[[load]]\ngravity = [0, 1]\n", {":6: ", "three numbers"}},
         BadScene{"LoadGravityNan", "[[load]]\ngravity = [0, nan, 0]\n", {":6: ", "finite"}},
@@ -258,22 +260,28 @@ INSTANTIATE_TEST_SUITE_P(
                  {":6: ", "not be zero"}},
         BadScene{"LoadRadialKey", "[[load]]\nradial = { strenth = 1 }\n", {":6: ", "'strength'"}},
         BadScene{"RegionNone", "[[region]]\nyoung = 1\n", {":5: ", "exactly one"}},
-        BadScene{"RegionRadius", "[[region]]\nsphere = { center = [0,0,0], radius = 0 }\n",
+        BadScene{"RegionRadius",
+                 "[[region]]\nsphere = { center = [0,0,0], radius = 0 }\n",
                  {":6: ", "greater than 0"}},
         BadScene{"RegionSingle", "[region]\nyoung = 1\n", {":5: ", "[[region]]"}},
         BadScene{"CutNothing", "[[cut]]\nstart = 0\n", {":5: ", "'lines' or 'mesh'"}},
         BadScene{"CutOneLine", "[[cut]]\nlines = [" + kLine + "]\n", {":6: ", "at least 2 lines"}},
         BadScene{"CutNoLines", "[[cut]]\nlines = []\n", {":6: ", "at least 2 lines"}},
         BadScene{"CutPoint", "[[cut]]\nlines = [" + kLine + ", [[0,0,0]]]\n", {":6: ", "2 points"}},
-        BadScene{"CutUneven", "[[cut]]\nlines = [" + kLine + ", [[0,0,0],[0,0,1],[0,0,2]]]\n",
+        BadScene{"CutUneven",
+                 "[[cut]]\nlines = [" + kLine + ", [[0,0,0],[0,0,1],[0,0,2]]]\n",
                  {":6: ", "same number of points"}},
-        BadScene{"CutNan", "[[cut]]\nlines = [" + kLine + ",\n [[0,0,nan],[0,0,1]]]\n",
+        BadScene{"CutNan",
+                 "[[cut]]\nlines = [" + kLine + ",\n [[0,0,nan],[0,0,1]]]\n",
                  {":7: ", "finite"}},
-        BadScene{"CutEnd", "[[cut]]\nstart = 0.2\nend = 0.2\nlines = [" + kLine + "," + kLine + "]\n",
+        BadScene{"CutEnd",
+                 "[[cut]]\nstart = 0.2\nend = 0.2\nlines = [" + kLine + "," + kLine + "]\n",
                  {":7: ", "later than start"}},
-        BadScene{"CutStartNegative", "[[cut]]\nstart = -1\nlines = [" + kLine + "," + kLine + "]\n",
+        BadScene{"CutStartNegative",
+                 "[[cut]]\nstart = -1\nlines = [" + kLine + "," + kLine + "]\n",
                  {":6: ", "0 or greater"}},
-        BadScene{"CutAfterEnd", "[[cut]]\nstart = 5\nlines = [" + kLine + "," + kLine + "]\n",
+        BadScene{"CutAfterEnd",
+                 "[[cut]]\nstart = 5\nlines = [" + kLine + "," + kLine + "]\n",
                  {":6: ", "duration"}},
         BadScene{"CutMeshEnd", "[[cut]]\nend = 1\nmesh = \"b.obj\"\n", {":6: ", "all at once"}},
         BadScene{"CutMeshAndLines",
@@ -301,7 +309,8 @@ TEST(Scene, BadBodiesAreNamed) {
   expect_parts(body("shape = \"box\"\nsize = [1, 0, 1]\n"), {":3: ", "greater than 0"});
   expect_parts(body("shape = \"box\"\nsize = [1, 1]\n"), {":3: ", "three numbers"});
   expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nlength = 1\n"), {":4: ", "'mesh'"});
-  expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nthickness = 1\n"), {":4: ", "cylinder-shell"});
+  expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nthickness = 1\n"),
+               {":4: ", "cylinder-shell"});
   expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nresolution = 0\n"), {":4: ", "resolution"});
   expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nrefinement = 9\n"), {":4: ", "from 0 to 8"});
   expect_parts(body("shape = \"box\"\nsize = [1,1,1]\nrefinement = -1\n"), {":4: ", "from 0 to 8"});
@@ -332,7 +341,8 @@ TEST(Scene, OverrideErrorsNameTheArgument) {
   expect_parts(error_of(kBox, {"slver.tolerance=1e-3"}),
                {"--set slver.tolerance=1e-3: ", "did you mean 'solver'"});
   expect_parts(error_of(kBox, {"material.poisson=0.6"}), {"--set material.poisson=0.6: "});
-  expect_parts(error_of(kBox, {"material.young=soft"}), {"--set material.young=soft: ", "a string"});
+  expect_parts(error_of(kBox, {"material.young=soft"}),
+               {"--set material.young=soft: ", "a string"});
   expect_parts(error_of(kBox, {"cut.0.start=1"}), {"--set cut.0.start=1: ", "[[cut]]"});
   expect_parts(error_of(kBox, {"body.size.3=1"}), {"--set body.size.3=1: ", "3 entries"});
   expect_parts(error_of(kBox, {"body.size.x=1"}), {"--set body.size.x=1: ", "a number"});
@@ -349,8 +359,8 @@ TEST(Scene, LaterOverrideWinsAndIsNamed) {
 }
 
 TEST(Scene, PlacesAreKept) {
-  const Scene scene = read(kBox + "[[cut]]\nlines = [" + kLine + "," + kLine + "]\n",
-                           {"solver.precision=mixed"});
+  const Scene scene =
+      read(kBox + "[[cut]]\nlines = [" + kLine + "," + kLine + "]\n", {"solver.precision=mixed"});
   EXPECT_EQ(scene.place_of("cut.0"), "scene.toml:5");
   EXPECT_EQ(scene.place_of("cut.0.lines"), "scene.toml:6");
   EXPECT_EQ(scene.place_of("cut.0.end"), "scene.toml:5") << "not given: its section";
@@ -359,8 +369,7 @@ TEST(Scene, PlacesAreKept) {
 }
 
 TEST(Scene, MissingFileAndFolderAreErrors) {
-  for (const fs::path& path : {fs::path("no-such-scene.toml"), fs::temp_directory_path()})
-    try {
+  for (const fs::path& path : {fs::path("no-such-scene.toml"), fs::temp_directory_path()}) try {
       read_scene(path);
       FAIL() << path;
     } catch (const Error& error) {
