@@ -4,6 +4,7 @@
 // docs/scene.md says the same for scene files.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -78,7 +79,7 @@ struct TimeSetup {
   double duration = 1.0;  ///< s, > 0
   bool lumped_mass = false;
   double nonlinear_tolerance = 1e-8;  ///< static mode: relative residual of the equilibrium
-  int nonlinear_iterations = 200;     ///< static mode: rotation updates before giving up
+  int nonlinear_iterations = 400;     ///< static mode: rotation updates before giving up
 };
 
 enum class SolverMethod { cg, multigrid, cg_jacobi, cholesky };
@@ -91,10 +92,10 @@ struct SolverSetup {
   CycleType cycle = CycleType::automatic;
   SmootherType smoother = SmootherType::chebyshev;
   int pre_sweeps = 1, post_sweeps = 1;
-  double omega = 1.0;       ///< over-relaxation of Gauss-Seidel, in (0, 2)
-  double tolerance = 1e-6;  ///< true relative residual of each linear solve
-  int cycles = 0;           ///< > 0: this fixed number instead of the tolerance
-  int max_cycles = 500;
+  double omega = 1.0;            ///< over-relaxation of Gauss-Seidel, in (0, 2)
+  double tolerance = 1e-6;       ///< true relative residual of each linear solve
+  int cycles = 0;                ///< > 0: this fixed number instead of the tolerance
+  int max_cycles = 500;          ///< before giving up; cg_jacobi: 50 times as many
   int rotation_updates = 2;      ///< a dynamic step
   int coarsest_vertices = 1500;  ///< direct solve at the first level with at most so many
   int max_levels = 0;            ///< 0: no limit

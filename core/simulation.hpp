@@ -32,7 +32,8 @@ struct StepReport {
   int rotation_updates = 0;
   int cycles = 0;              ///< multigrid cycles or CG iterations, all linear solves together
   double linear_residual = 0;  ///< largest true relative residual of its linear solves
-  double residual = 0;         ///< relative residual of the nonlinear equation at the end
+  double residual = 0;         ///< relative residual of the nonlinear equation at the end; the
+                               ///< largest double if the motion blew up, which ends the run
   bool converged = true;       ///< linear solves and, in static mode, equilibrium
   double seconds = 0;
   std::vector<CutEvent> cuts;
@@ -81,7 +82,8 @@ class Simulation {
   bool finished() const;
   int steps_planned() const;
   /// Makes the cuts that are due, then one time step or one equilibrium.
-  /// @throws Error (bad_input) in static mode if a piece is held by nothing; names the piece.
+  /// @throws Error (bad_input) in static mode if a piece is held by nothing; names the piece. After
+  /// a throw the object may only be destroyed.
   StepReport step();
   void on_progress(Progress progress);
 
@@ -114,6 +116,4 @@ class Simulation {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A backend by name: cpu; cuda, if it was built and a device is present; auto.
-/// @throws Error (unavailable) with the reason.
 }  // namespace kerf

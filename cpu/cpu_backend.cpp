@@ -26,12 +26,16 @@ namespace {
 
 using namespace cpu;
 
+constexpr int kMaxThreads = 1024;
+
 class CpuBackend final : public Backend {
  public:
   explicit CpuBackend(const CpuOptions& options)
       : threads_(options.threads > 0 ? options.threads : omp_get_max_threads()),
         tile_log2_(options.tile_log2),
         coarsest_factor_(CholeskyEngine::simplicial) {
+    expects(options.threads >= 0 && options.threads <= kMaxThreads,
+            text("solver.threads must lie in 0 .. ", kMaxThreads, "; 0 takes all cores"));
     expects(options.tile_log2 >= 0 && options.tile_log2 <= 6, "tile_log2 must lie in 0 .. 6");
   }
 
@@ -238,9 +242,10 @@ void CpuBackend::factor_coarsest() {
     std::copy_n(packed, kEntries, out.data());
   });
   if (levels_.size() > 1) coarsest_->strengthen_diagonal();
-  expects(coarsest_factor_.factor(*coarsest_),
-          "the stiffness matrix is singular: some part of the body can move freely; hold it with a "
-          "[[support]], or use time.mode = \"dynamic\"");
+  expects(
+      coarsest_factor_.factor(*coarsest_),
+      "the system matrix is not positive definite: in static mode some part of the body can move "
+      "freely and needs a [[support]]; otherwise sizes, moduli or the time step are out of range");
 }
 
 void CpuBackend::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {

@@ -123,6 +123,10 @@ NonlinearStats Motion::step() {
     stats.linear_residual = std::max(stats.linear_residual, solve.residual);
     stats.converged = stats.converged && solve.converged;
     ++stats.rotation_updates;
+    if (!std::isfinite(solve.residual)) {  // overflow: nothing below would be a number
+      stats.residual = solve.residual;
+      return stats;
+    }
     backend_.add(0, 1, increment_, state_.displacement);
     backend_.add(0, velocity_factor(), increment_, state_.velocity);
     backend_.add(0, acceleration_factor(), increment_, acceleration_);

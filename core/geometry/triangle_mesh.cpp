@@ -104,16 +104,18 @@ TriangleMesh weld(const TriangleMesh& mesh) {
 }
 
 void check_finite(const TriangleMesh& mesh, const std::string& name) {
+  // The message is put together only when it is needed: meshes are large.
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     const Vec3d& p = mesh.points[i];
-    expects(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z),
-            text(name, ": point ", i, " (", p.x, ", ", p.y, ", ", p.z, ") is not finite"));
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) continue;
+    expects(false, text(name, ": point ", i, " (", p.x, ", ", p.y, ", ", p.z, ") is not finite"));
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
-    for (const std::int32_t k : mesh.triangles[i])
-      expects(k >= 0 && static_cast<std::size_t>(k) < mesh.points.size(),
-              text(name, ": triangle ", i, " refers to point ", k, ", but there are ",
-                   mesh.points.size(), " points"));
+    for (const std::int32_t k : mesh.triangles[i]) {
+      if (k >= 0 && static_cast<std::size_t>(k) < mesh.points.size()) continue;
+      expects(false, text(name, ": triangle ", i, " refers to point ", k, ", but there are ",
+                          mesh.points.size(), " points"));
+    }
 }
 
 }  // namespace kerf

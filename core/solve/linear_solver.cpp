@@ -46,9 +46,11 @@ void LinearSolver::refresh() {
     assembled_->assemble(hierarchy_->levels[0], [&](std::int32_t cell, std::span<double> out) {
       backend_.read_cell_matrix(0, cell, out);
     });
-    expects(cholesky_->factor(*assembled_),
-            "the stiffness matrix is singular: some part of the body can move freely; hold it with "
-            "a [[support]], or use time.mode = \"dynamic\"");
+    expects(
+        cholesky_->factor(*assembled_),
+        "the system matrix is not positive definite: in static mode some part of the body can move "
+        "freely and needs a [[support]]; otherwise sizes, moduli or the time step are out of "
+        "range");
     return;
   }
   backend_.prepare(0);
@@ -78,7 +80,7 @@ SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference)
   const double goal = tolerance * reference;
   switch (setup_.method) {
     case SolverMethod::cholesky:
-      return direct(b, x, reference);
+      return direct(b, x, goal, reference);
     case SolverMethod::multigrid:
       return multigrid(b, x, goal, reference);
     case SolverMethod::cg_jacobi:
@@ -104,7 +106,8 @@ void LinearSolver::precondition(bool jacobi) {
 SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double reference,
                                              bool jacobi) {
   const bool fixed = setup_.cycles > 0;
-  const int limit = fixed ? setup_.cycles : (jacobi ? 50 : 1) * setup_.max_cycles;
+  const std::int64_t limit =
+      fixed ? setup_.cycles : (jacobi ? std::int64_t{50} : std::int64_t{1}) * setup_.max_cycles;
   constexpr int kRestarts = 3;  // when the recursion and the true residual part
   SolveStats stats;
   double norm = true_residual(b, x);
@@ -160,13 +163,24 @@ SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) 
   return stats;
 }
 
-SolveStats LinearSolver::direct(int b, int x, double reference) {
+SolveStats LinearSolver::direct(int b, int x, double goal, double reference) {
+  constexpr int kRefinements = 3;  // of the solution with the same factor; one is usually enough
   std::vector<double> right(3 * hierarchy_->levels[0].point.size()), solution(right.size());
-  backend_.read(0, b, right);
-  cholesky_->solve(right, solution);
-  backend_.write(0, x, solution);
-  backend_.mask(0, x);
-  return {1, true_residual(b, x) / reference, true};
+  backend_.zero(0, x);
+  SolveStats stats;
+  double norm = true_residual(b, x);
+  do {
+    backend_.read(0, kRight, right);
+    cholesky_->solve(right, solution);
+    backend_.write(0, kSolution, solution);
+    backend_.mask(0, kSolution);
+    backend_.add(0, 1, kSolution, x);
+    norm = true_residual(b, x);
+    ++stats.cycles;
+  } while (norm > goal && stats.cycles <= kRefinements);
+  stats.residual = norm / reference;
+  stats.converged = norm <= goal;
+  return stats;
 }
 
 std::size_t LinearSolver::bytes() const {

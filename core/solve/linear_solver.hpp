@@ -49,7 +49,7 @@ class LinearSolver {
  private:
   SolveStats conjugate_gradients(int b, int x, double goal, double reference, bool jacobi);
   SolveStats multigrid(int b, int x, double goal, double reference);
-  SolveStats direct(int b, int x, double reference);
+  SolveStats direct(int b, int x, double goal, double reference);
   double true_residual(int b, int x);  // leaves b - A x in kRight
   void precondition(bool jacobi);
 

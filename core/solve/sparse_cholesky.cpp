@@ -135,7 +135,7 @@ struct CholmodEngine final : Engine {
     return true;
   }
   void check() const {
-    if (common.status == CHOLMOD_OUT_OF_MEMORY)
+    if (common.status == CHOLMOD_OUT_OF_MEMORY || common.status == CHOLMOD_TOO_LARGE)
       throw Error(ErrorKind::unavailable,
                   "out of memory in sparse Cholesky; set solver.method = \"cg\"");
     ensures(common.status >= CHOLMOD_OK, text("CHOLMOD status ", common.status));

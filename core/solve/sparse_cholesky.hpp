@@ -24,10 +24,10 @@ class AssembledLevel {
   explicit AssembledLevel(const Level& level);
   /// Sums the cell matrices (300 doubles each, kernels/layout.hpp) in the order of the cells.
   void assemble(const Level& level, const ReadCell& read_cell);
-  /// For Galerkin matrices of a coarse level. Where supports hold most vertices of a few fine cells,
-  /// fewer free ones are left than the coarse vertices above them, and the matrix is singular,
-  /// though the body is held. A relative 1e-12 on the diagonal makes it definite; what it changes
-  /// the transfer to the finer level sends to zero.
+  /// For Galerkin matrices of a coarse level. Where supports hold most vertices of a few fine
+  /// cells, fewer free ones are left than the coarse vertices above them, and the matrix is
+  /// singular, though the body is held. A relative 1e-12 on the diagonal makes it definite; what it
+  /// changes the transfer to the finer level sends to zero.
   void strengthen_diagonal();
 
   int unknowns() const { return static_cast<int>(column_begin.size()) - 1; }
