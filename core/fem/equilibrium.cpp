@@ -24,7 +24,9 @@ Equilibrium::Equilibrium(Backend& backend, LinearSolver& solver, const TimeSetup
       increment_(backend.add_vector()),
       best_(backend.add_vector()),
       previous_u_(backend.add_vector()),
-      previous_d_(backend.add_vector()) {
+      previous_d_(backend.add_vector()),
+      velocity_(backend.add_vector()),
+      work_(backend.add_vector()) {
   for (int i = 0; i < 2 * kDepth; ++i) free_.push_back(backend_.add_vector());
 }
 
@@ -99,21 +101,36 @@ void Equilibrium::anderson_step(int depth) {
   }
 }
 
-// Steps with a mass term and the velocity thrown away; returns whether Anderson may go on.
+// Implicit steps with a mass, as a body would fall into place, its velocity thrown away whenever
+// the forces work against it; returns whether Anderson may go on.
 bool Equilibrium::pseudo_time(double natural_time) {
-  constexpr int kSteps = 30;
+  constexpr int kSteps = 60;
   constexpr double kNear = 0.05;  // of the residual at entry
-  double dt = 0.25 * natural_time, last = stats_.residual;
-  const double entry = last;
+  constexpr int kGood = 3;        // steps in a row before the step grows
+  double dt = 0.25 * natural_time;
+  const double entry = stats_.residual;
+  int good = 0;
+  backend_.zero(0, velocity_);
   for (int i = 0; i < kSteps && stats_.rotation_updates < time_.nonlinear_iterations; ++i) {
+    const double power = backend_.dot(0, right_, velocity_);
+    if (power < 0) {
+      backend_.zero(0, velocity_);
+      dt *= 0.5;
+      good = 0;
+    } else if (++good > kGood) {
+      dt *= 2;
+      good = 0;
+    }
+    backend_.apply_scaled({0, 1 / dt}, velocity_, work_);
+    backend_.mask(0, work_);
+    backend_.add(0, 1, work_, right_);
     update(1 / (dt * dt));
     backend_.add(0, 1, increment_, state_.displacement);
+    backend_.combine(0, 1 / dt, increment_, 0, velocity_);
     stats_.residual = residual();
     if (progress_) progress_(stats_.rotation_updates, stats_.residual);
     if (!std::isfinite(stats_.residual)) return false;
     if (finished() || stats_.residual < kNear * entry) return true;
-    dt *= stats_.residual < last ? 1.3 : 0.5;
-    last = stats_.residual;
   }
   return true;
 }

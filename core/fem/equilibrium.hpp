@@ -5,7 +5,8 @@
 // Each update takes the rotations of the last iterate and solves the linear problem; that map
 // diverges under large loads, so it is accelerated by Anderson's method, and where that stalls, a
 // mass term (pseudo time) leads closer first. Line searches stall: docs/convergence.md.
-// Source  Walker, Ni 2011 [WN11]; [DGW11] section 5.
+// An equilibrium that is found need not be the stable one: a column may stand beyond its buckling.
+// Source  Walker, Ni 2011 [WN11]; [DGW11] section 5; Bitzek et al. 2006 [BKGMG06] for the velocity.
 #pragma once
 
 #include <functional>
@@ -42,7 +43,7 @@ class Equilibrium {
   TimeSetup time_;
   SolverSetup setup_;
   StateVectors state_;
-  int right_, increment_, best_, previous_u_, previous_d_;
+  int right_, increment_, best_, previous_u_, previous_d_, velocity_, work_;
   std::vector<int> du_, dd_;  // differences of iterates and of increments, newest last
   std::vector<int> free_;     // vectors to store them in
   bool keep_rotations_ = false;
