@@ -101,7 +101,7 @@ void combs() {
           setup.courant = courant;
           setup.solver = solver(cycle, SmootherType::chebyshev);
           setup.solver.duplicate_cells = duplicate;
-          setup.solver.max_cycles = 150;
+          setup.solver.max_cycles = 1000;
           row(std::string(rotated ? "rotated" : "aligned") + ", " +
                   (courant > 0 ? "dynamic" : "static") + ", " +
                   (duplicate ? "duplicated" : "by place") + ", " + name(cycle),
