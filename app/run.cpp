@@ -21,7 +21,8 @@ namespace {
 
 volatile std::sig_atomic_t interrupt_asked = 0;
 
-/// While it lives, an interrupt asks the run to stop after the step; a second one ends it at once.
+/// While it lives, an interrupt (or a request to terminate) asks the run to stop after the step; a
+/// second one ends it at once.
 class InterruptGuard {
  public:
   InterruptGuard() {
@@ -30,14 +31,19 @@ class InterruptGuard {
     action.sa_handler = [](int) { interrupt_asked = 1; };
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigaction(SIGINT, &action, &before_);
+    sigaction(SIGTERM, &action, &before_terminate_);
   }
-  ~InterruptGuard() { sigaction(SIGINT, &before_, nullptr); }
+  ~InterruptGuard() {
+    sigaction(SIGINT, &before_, nullptr);
+    sigaction(SIGTERM, &before_terminate_, nullptr);
+  }
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
   static bool asked() { return interrupt_asked != 0; }
 
  private:
   struct sigaction before_ {};
+  struct sigaction before_terminate_ {};
 };
 
 std::size_t peak_bytes() {
@@ -189,7 +195,9 @@ class Run {
     summary_.precision = precision_name(scene_.setup.solver.precision);
     summary_.state_hash = s.state_hash();
     summary_.warnings.insert(summary_.warnings.begin(), s.warnings().begin(), s.warnings().end());
-    if (!summary_.interrupted) missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
+    // A blade may still be on its way in a run that stopped early.
+    if (static_cast<int>(summary_.steps.size()) >= simulation_.steps_planned())
+      missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
     if (!missed_.empty()) summary_.warnings.push_back(missed_);
   }
 

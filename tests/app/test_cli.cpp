@@ -60,7 +60,7 @@ class KerfCommand : public testing::Test {
  protected:
   void SetUp() override {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    root_ = fs::path(testing::TempDir()) / (std::string("kerf_cli_") + info->name());
+    root_ = fs::path(testing::TempDir()) / ("kerf_cli_" + std::to_string(getpid()) + info->name());
     fs::remove_all(root_);
     fs::create_directories(root_);
   }

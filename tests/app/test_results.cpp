@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <filesystem>
@@ -72,9 +73,9 @@ std::vector<T> vtu_array(const std::string& vtu, const std::string& name) {
 class ResultsTest : public testing::Test {
  protected:
   void SetUp() override {
-    root_ = fs::path(testing::TempDir()) /
-            ("kerf_results_" +
-             std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    root_ =
+        fs::path(testing::TempDir()) / ("kerf_results_" + std::to_string(getpid()) + info->name());
     fs::remove_all(root_);
     fs::create_directories(root_);
   }

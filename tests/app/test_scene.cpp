@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -381,7 +382,7 @@ TEST(Scene, MissingFileAndFolderAreErrors) {
 class MeshSceneTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "kerf_mesh_scene";
+    folder_ = fs::path(testing::TempDir()) / ("kerf_mesh_scene" + std::to_string(getpid()));
     fs::create_directories(folder_);
     std::ofstream(folder_ / "tetra.off") << "OFF\n4 4 0\n10 20 30\n14 20 30\n10 22 30\n10 20 31\n"
                                             "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
