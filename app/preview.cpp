@@ -274,6 +274,8 @@ class Painter {
   static constexpr float kReach = 0.5f;  // of ambient occlusion, in diagonals
   static constexpr float kFar = 10.0f;   // beyond the body
   static constexpr int kSunRays = 3;
+  static constexpr Vec kBounce{0.30f, 0.27f,
+                               0.25f};  // light from faces nearby: wounds are not black
 
   Vec shade(const Vec& direction, float y, Samples& samples) const {
     const auto hit = scene_.trace(camera_.eye, direction);
@@ -297,7 +299,10 @@ class Painter {
     for (int k = 0; k < options_.occlusion; ++k) {
       const auto [a, b] = samples.next();
       const Vec direction = around(normal, std::sqrt(a), 2 * kPi * b);
-      if (scene_.occluded(place, direction, kReach)) continue;
+      if (scene_.occluded(place, direction, kReach)) {
+        sum += kBounce;
+        continue;
+      }
       const float height = 0.5f + 0.5f * dot(direction, up_);
       sum += mix({0.55f, 0.52f, 0.49f}, {0.98f, 1.0f, 1.04f}, height);
     }
