@@ -27,7 +27,7 @@ std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
   expects(solver.backend == "cuda", text("solver.backend = \"", solver.backend,
                                          "\": expected \"cpu\", \"cuda\" or \"auto\""));
   throw Error(ErrorKind::unavailable,
-              "this build has no CUDA backend; configure with -DKERF_CUDA=ON or set backend = "
+              "this version has no CUDA backend yet; set backend = "
               "\"cpu\"");
 }
 
@@ -35,7 +35,7 @@ std::vector<std::pair<std::string, std::string>> backend_states() {
   const auto cpu = make_cpu_backend({});
   return {{"cpu", text("ready, ", cpu->threads(), cpu->threads() == 1 ? " thread" : " threads",
                        ", double precision")},
-          {"cuda", "not built; configure with -DKERF_CUDA=ON"}};
+          {"cuda", "not in this version"}};
 }
 
 }  // namespace kerf

@@ -25,6 +25,9 @@ int main(int argc, char** argv) {
   CLI::App* run = app.add_subcommand("run", "Run a scene and write its results");
   run->add_option("scene", options.scene, "The scene file")->required()->type_name("SCENE.toml");
   run->add_option("-o,--out", options.out, "The folder for the results")
+      ->check([](const std::string& out) {
+        return out.empty() ? std::string("must name a folder") : std::string();
+      })
       ->required()
       ->type_name("DIR");
   run->add_flag("-q,--quiet", options.quiet, "Print errors and warnings only");

@@ -4,6 +4,7 @@
 #include <embree3/rtcore.h>
 #include <png.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -381,9 +382,16 @@ void draw_preview(const std::filesystem::path& file, const Snapshot& snapshot,
                   const PreviewOptions& options) {
   const PreviewSurface surface = preview_surface(snapshot);
   expects(!surface.quads.empty(), "preview: the body has no surface to draw");
+  // Single precision squares lengths on the way.
+  constexpr double kFarthest = 1e15;
+  for (std::size_t p = 0; p < snapshot.points.size(); ++p)
+    expects(norm(snapshot.points[p] + snapshot.displacement[p]) < kFarthest,
+            "preview: the body reaches too far to be drawn");
   const RayScene scene(surface);
-  const float length = norm(to_float(options.up));
-  const Vec up = length > 0 ? to_float(options.up) * (1 / length) : Vec{0, 1, 0};
+  const double greatest =
+      std::max({std::abs(options.up.x), std::abs(options.up.y), std::abs(options.up.z)});
+  const Vec scaled = greatest > 0 ? to_float((1 / greatest) * options.up) : Vec{0, 1, 0};
+  const Vec up = scaled * (1 / norm(scaled));
   const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
   const Camera camera = choose_camera(scene, up, aspect);
   const std::vector<std::uint8_t> rgb = paint(Painter(scene, camera, up, options), options);

@@ -166,13 +166,15 @@ void ResultsFolder::add_snapshot(int step, double time, const Snapshot& snapshot
   series_.emplace_back(time, name);
 }
 
-void ResultsFolder::remove_stale() const {
+// Files of an earlier run that this one did not write again. Where no summary was, none was ours.
+void ResultsFolder::remove_stale(bool earlier_run) const {
   std::error_code error;
   std::vector<fs::path> stale;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename().string();
     const bool written = std::find(files_.begin(), files_.end(), name) != files_.end();
-    if ((is_ours(name) && !written && name != kSummary) || is_our_partial(name))
+    const bool left_over = earlier_run && is_ours(name) && !written && name != kSummary;
+    if ((left_over || is_our_partial(name)) && entry.is_regular_file(error))
       stale.push_back(entry.path());
   }
   for (const auto& path : stale) fs::remove(path, error);
@@ -192,8 +194,17 @@ void ResultsFolder::commit(const Summary& summary) {
   }
   write_text(kSummary, to_json(summary));
 
-  // The old summary goes first and the new one comes last: a summary means that all is there.
+  // Nothing may stand in the way of a file once the renaming has begun.
   std::error_code error;
+  const auto expect_free = [&](const std::string& name) {
+    const fs::file_status status = fs::symlink_status(folder_ / name, error);
+    if (fs::exists(status) && !fs::is_regular_file(status))
+      throw cannot_write(folder_ / name, "something that is no file has this name; move it away");
+  };
+  for (const auto& name : files_) expect_free(name);
+  expect_free(kSummary);
+  const bool earlier_run = fs::exists(folder_ / kSummary, error);
+  // The old summary goes first and the new one comes last: a summary means that all is there.
   fs::remove(folder_ / kSummary, error);
   for (const auto& name : files_) {
     fs::rename(folder_ / partial_name(name), folder_ / name, error);
@@ -202,7 +213,7 @@ void ResultsFolder::commit(const Summary& summary) {
   fs::rename(folder_ / partial_name(kSummary), folder_ / kSummary, error);
   if (error) throw cannot_write(folder_ / kSummary, error.message());
   committed_ = true;
-  remove_stale();
+  remove_stale(earlier_run);
 }
 
 }  // namespace kerf

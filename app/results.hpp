@@ -61,7 +61,7 @@ class ResultsFolder {
 
  private:
   void write_text(const std::string& name, const std::string& content);
-  void remove_stale() const;
+  void remove_stale(bool earlier_run) const;
 
   std::filesystem::path folder_;
   OutputSettings settings_;

@@ -163,7 +163,7 @@ class Run {
     try {
       draw_preview(results_.add_file("preview.png"), snapshot_, {.up = up_direction(scene_.setup)});
       drawn_ = true;
-    } catch (const Error& error) {  // a run is worth keeping without its picture
+    } catch (const std::exception& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");
       summary_.warnings.push_back(text("no preview.png: ", error.what()));
       complain("warning: " + summary_.warnings.back());

@@ -63,6 +63,15 @@ std::string missed_blades(const Scene& scene, const std::vector<std::size_t>& hi
       for (const auto& p : line) blade.add(p);
     for (const auto& p : cut.mesh.points) blade.add(p);
     const double distance = gap(blade, body);
+    const TimeSetup& time = scene.setup.time;
+    if (time.mode == TimeMode::dynamic && cut.end && *cut.end > time.duration) {
+      all += fmt::format(
+          "{}{}: cut {} met no link of the body: the run ended at {:.4g} s, when {:.0f} % of its "
+          "sweep was made; lengthen time.duration or let the cut end earlier",
+          all.empty() ? "" : "\n", scene.place_of(fmt::format("cut.{}", i)), i + 1, time.duration,
+          100 * (time.duration - cut.start) / (*cut.end - cut.start));
+      continue;
+    }
     all += fmt::format(
         "{}{}: cut {} met no link of the body: the blade sweeps {}, the body fills "
         "{}{}",
