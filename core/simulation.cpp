@@ -186,7 +186,7 @@ void Simulation::Impl::load_structure() {
 void Simulation::Impl::check_memory() const {
   constexpr double kBytesPerCell = 2700;
   const double bytes = kBytesPerCell * static_cast<double>(body.leaf_count());
-  const double available = static_cast<double>(physical_memory());
+  const double available = physical_memory();
   if (bytes < 0.9 * available) return;
   throw Error(
       ErrorKind::unavailable,

@@ -85,24 +85,17 @@ Vec cell_row(const LevelStore& store, std::int32_t cell, int slot, const double*
     return (finest.scale.stiffness * values.stiffness) * (R * elastic) +
            (finest.scale.mass * values.mass) * inertia;
   }
+  Vec at[8];
+  for (int j = 0; j < 8; ++j) at[j] = load(u, slots[j]);
   if (store.finest != nullptr) {
-    Vec at[8], f[8];
-    for (int j = 0; j < 8; ++j) at[j] = load(u, slots[j]);
+    Vec f[8];
     cell_product(store, cell, at, f);
     return f[slot];
   }
-  const auto A = kernels::cell_entries(store.matrices.data(), static_cast<std::size_t>(cell),
-                                       kEntries, store.tile_log2);
-  Vec sum{};
-  for (int j = 0; j < 8; ++j) {
-    const Vec at = load(u, slots[j]);
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        const int p = 3 * slot + a, q = 3 * j + b;
-        sum[a] += A[p >= q ? kernels::packed_index(p, q) : kernels::packed_index(q, p)] * at[b];
-      }
-  }
-  return sum;
+  return kernels::apply_packed_row(
+      kernels::cell_entries(store.matrices.data(), static_cast<std::size_t>(cell), kEntries,
+                            store.tile_log2),
+      slot, at);
 }
 
 void cell_matrix(const LevelStore& store, std::int32_t cell, double (&packed)[kEntries]) {

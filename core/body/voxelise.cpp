@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "core/body/voxelise.hpp"
 
-#include <unistd.h>
-
 #include <cmath>
 
 #include "core/base/error.hpp"
+#include "core/base/memory.hpp"
 
 namespace kerf {
 namespace {
@@ -15,12 +14,6 @@ namespace {
 // a surface crosses, in the lists of crossings and in the octree's records.
 constexpr double kBytesPerCell = 4;
 constexpr double kBytesPerFaceCell = 4 * 160;
-
-double machine_memory() {
-  const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
-  if (pages <= 0 || page <= 0) return std::numeric_limits<double>::infinity();
-  return static_cast<double>(pages) * static_cast<double>(page);
-}
 
 double gibibytes(double bytes) { return std::round(bytes / (1 << 30) * 100) / 100; }
 
@@ -54,7 +47,7 @@ Lattice make_lattice(const Box3& bounds, int resolution, int refinement, std::si
   }
   const double faces = 2 * (cells[0] * cells[1] + cells[1] * cells[2] + cells[2] * cells[0]);
   const double need = cells[0] * cells[1] * cells[2] * kBytesPerCell + faces * kBytesPerFaceCell;
-  const double have = memory_limit > 0 ? static_cast<double>(memory_limit) : machine_memory();
+  const double have = memory_limit > 0 ? static_cast<double>(memory_limit) : physical_memory();
   constexpr double kMostCellsAlong = 1 << 20;  // so that link keys fit 64 bits
   if (need > have || std::max({cells[0], cells[1], cells[2]}) >= kMostCellsAlong)
     throw Error(ErrorKind::unavailable,

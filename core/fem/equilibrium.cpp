@@ -145,13 +145,16 @@ NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
     }
   };
   forget();
+  backend_.copy(0, state_.displacement, best_);  // to come back to if the first update is lost
   stats_.residual = residual();
   double best = std::numeric_limits<double>::infinity();
   int since_best = 0, depth = 0;
   while (!(finished() && !keep_rotations_) &&
          stats_.rotation_updates < time_.nonlinear_iterations) {
+    const bool kept = keep_rotations_;
     update(0);
     anderson_step(depth++);
+    if (kept) depth = 0;  // its increment belongs to another map than the next ones
     stats_.residual = residual();
     if (progress_) progress_(stats_.rotation_updates, stats_.residual);
     if (stats_.residual < best) {
