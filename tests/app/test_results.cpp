@@ -201,6 +201,7 @@ TEST_F(ResultsTest, WithoutCommitAnEarlierRunStays) {
 }
 
 TEST_F(ResultsTest, StaleFilesOfOursGoOthersStay) {
+  ResultsFolder(root_, {}).commit({});  // an earlier run was here
   for (const char* name : {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "body_x.vtu",
                            "my_body_0001.vtu", "notes.txt", "body_12.vtu"})
     touch(root_ / name);
@@ -210,6 +211,28 @@ TEST_F(ResultsTest, StaleFilesOfOursGoOthersStay) {
   EXPECT_EQ(names(root_),
             (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_12.vtu", "body_x.vtu",
                                       "my_body_0001.vtu", "notes.txt", "summary.json"}));
+}
+
+TEST_F(ResultsTest, WhereNoRunWasNothingGoes) {
+  touch(root_ / "body_0042.vtu");
+  touch(root_ / "preview.png");
+  ResultsFolder results(root_, {});
+  results.add_snapshot(0, 0.0, two_cut_cells());
+  results.commit({});
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0042.vtu",
+                                                    "preview.png", "summary.json"}));
+}
+
+TEST_F(ResultsTest, FolderInPlaceOfAFileChangesNothing) {
+  ResultsFolder(root_, {}).commit({});
+  const std::string summary = read_all(root_ / "summary.json");
+  fs::create_directories(root_ / "body_0001.vtu" / "inside");
+  ResultsFolder results(root_, {});
+  results.add_snapshot(0, 0.0, two_cut_cells());
+  results.add_snapshot(1, 0.1, two_cut_cells());
+  EXPECT_THROW(results.commit({}), Error);
+  EXPECT_FALSE(fs::exists(root_ / "body_0000.vtu"));
+  EXPECT_EQ(read_all(root_ / "summary.json"), summary);
 }
 
 TEST_F(ResultsTest, FileInPlaceOfTheFolderIsAnError) {
