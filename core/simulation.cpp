@@ -65,7 +65,8 @@ struct Simulation::Impl {
                 std::vector<std::vector<double>> values, const std::vector<double>& rotations);
   std::vector<double> hold(std::vector<double> values, bool is_displacement) const;
   double natural_time() const;
-  void step_back(const std::vector<std::vector<double>>& before);
+  void copy_state(const StateVectors& from, const StateVectors& to);
+  void step_back();
   void warn_of_pieces();
   std::vector<double> read_vector(int x) const;
   StepReport step();
@@ -78,7 +79,7 @@ struct Simulation::Impl {
   CutSchedule schedule;
   LinearSolver solver;
   Hierarchy hierarchy;
-  StateVectors state;
+  StateVectors state, before_step;
   std::unique_ptr<Motion> motion;
   std::unique_ptr<Equilibrium> equilibrium;
   std::vector<double> held;  // displacement of held components
@@ -101,11 +102,15 @@ void Simulation::Impl::start() {
   state.velocity = backend->add_vector();
   state.memory = backend->add_vector();
   state.external = backend->add_vector();
-  if (setup.time.mode == TimeMode::dynamic)
+  if (setup.time.mode == TimeMode::dynamic) {
+    before_step.displacement = backend->add_vector();
+    before_step.velocity = backend->add_vector();
+    before_step.memory = backend->add_vector();
     motion =
         std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver, state);
-  else
+  } else {
     equilibrium = std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
+  }
   build_structure();
   cells_before = hierarchy.values.size();
   warn_of_idle_supports();
@@ -274,11 +279,15 @@ void Simulation::Impl::transfer(const Level& before, const std::vector<std::int3
   backend->write_rotations(turned);
 }
 
+void Simulation::Impl::copy_state(const StateVectors& from, const StateVectors& to) {
+  backend->copy(0, from.displacement, to.displacement);
+  backend->copy(0, from.velocity, to.velocity);
+  backend->copy(0, from.memory, to.memory);
+}
+
 // The last good state is worth more than one that is no number; the run ends with it.
-void Simulation::Impl::step_back(const std::vector<std::vector<double>>& before) {
-  backend->write(0, state.displacement, before[0]);
-  backend->write(0, state.velocity, before[1]);
-  backend->write(0, state.memory, before[2]);
+void Simulation::Impl::step_back() {
+  copy_state(before_step, state);
   backend->rotate_cells(state.displacement);
   stopped = true;
   warnings.push_back(
@@ -308,10 +317,7 @@ StepReport Simulation::Impl::step() {
   report.pieces = pieces;
 
   const AddTime phase(clock.step);
-  std::vector<std::vector<double>> before;
-  if (motion)
-    for (const int x : {state.displacement, state.velocity, state.memory})
-      before.push_back(read_vector(x));
+  if (motion) copy_state(state, before_step);
   const NonlinearStats stats =
       motion ? motion->step() : equilibrium->solve(natural_time(), prescribed);
   prescribed = false;
@@ -328,7 +334,7 @@ StepReport Simulation::Impl::step() {
   report.vertices = hierarchy.levels[0].point.size();
   report.seconds = timer.seconds();
   if (motion && !std::isfinite(stats.residual)) {
-    step_back(before);
+    step_back();
     report.residual = std::numeric_limits<double>::max();
     report.converged = false;
   }

@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <random>
 
 #include "app/mesh_io.hpp"
 #include "core/body/voxelise.hpp"
 #include "core/geometry/winding.hpp"
+#include "tests/support/real_mesh.hpp"
 
 namespace kerf {
 namespace {
@@ -25,10 +25,7 @@ std::ostream& operator<<(std::ostream& out, const RealMesh& mesh) { return out <
 class RealMeshes : public ::testing::TestWithParam<RealMesh> {
  protected:
   void SetUp() override {
-    const char* folder = std::getenv("KERF_MESHES");
-    path_ = folder != nullptr ? std::filesystem::path(folder)
-                              : std::filesystem::path(KERF_SOURCE_DIR) / ".." / "shared" / "meshes";
-    path_ /= GetParam().file;
+    path_ = test::real_mesh(GetParam().file);
     if (!std::filesystem::exists(path_))
       GTEST_SKIP() << "no " << GetParam().file << "; set KERF_MESHES to the folder of meshes";
   }

@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 
 #include "app/mesh_io.hpp"
 #include "core/simulation.hpp"
 #include "cpu/cpu_backend.hpp"
+#include "tests/support/real_mesh.hpp"
 
 namespace kerf {
 namespace {
@@ -26,10 +26,7 @@ std::ostream& operator<<(std::ostream& out, const RealRun& run) { return out << 
 class RealRuns : public ::testing::TestWithParam<RealRun> {
  protected:
   void SetUp() override {
-    const char* folder = std::getenv("KERF_MESHES");
-    path_ = folder != nullptr ? std::filesystem::path(folder)
-                              : std::filesystem::path(KERF_SOURCE_DIR) / ".." / "shared" / "meshes";
-    path_ /= GetParam().file;
+    path_ = test::real_mesh(GetParam().file);
     if (!std::filesystem::exists(path_))
       GTEST_SKIP() << "no " << GetParam().file << "; set KERF_MESHES to the folder of meshes";
   }
