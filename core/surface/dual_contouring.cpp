@@ -54,6 +54,33 @@ std::uint64_t vertex_key(Kind kind, std::uint64_t number) {
   return static_cast<std::uint64_t>(kind) << 62 | number;
 }
 
+/// Whether at least two arcs of material lie around a face of a dual cell; once so, always so.
+bool has_arcs(const DualCell& cell, int axis, int side) {
+  const std::array<int, 4> ring = dual_face(axis, side);
+  int arcs = 0;
+  for (int k = 0; k < 4; ++k)
+    if ((cell.connected >> dual_link(ring[k], dual_face_axis(axis, k)) & 1) == 0 &&
+        cell.is_present(ring[k]))
+      ++arcs;
+  return arcs >= 2;
+}
+
+/// The grid edges from `points` with at least two arcs of material around them, ascending.
+std::vector<GridKey> edges_of_arcs(const Lattice& lattice, std::span<const GridKey> points,
+                                   std::span<const DualCell> cells) {
+  std::vector<GridKey> edges;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      for (int side = 0; side < 2; ++side) {
+        if (!has_arcs(cells[i], axis, side)) continue;
+        const Vec3i low = shifted(key_point(lattice, points[i]), axis, side - 1);
+        edges.push_back(3 * point_key(lattice, low) + static_cast<GridKey>(axis));
+      }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
 class DualContouring final : public SurfaceBuilder {
  public:
   void rebuild(const LinkedOctree& body, std::span<const GridKey> points,
@@ -102,7 +129,7 @@ void DualContouring::rebuild(const LinkedOctree& body, std::span<const GridKey> 
 
   remove_patches(links);
   for (std::size_t i = 0; i < points.size(); ++i) place_vertices(points[i], cells[i]);
-  for (const GridKey edge : edges_around(lattice, points)) place_mids(edge);
+  for (const GridKey edge : edges_of_arcs(lattice, points, cells)) place_mids(edge);
   for (const LinkKey link : links) {
     const Vec3i lower = lattice.link_lower(link);
     const int axis = Lattice::link_axis(link);

@@ -59,7 +59,7 @@ SurfaceHit corner_hit(const LinkedOctree& body, const Vec3i& point, int corner) 
   const LinkCut* cut = body.record(octant_cell(point, low), axis);
   ensures(cut != nullptr, "a disconnected link has no record");
   const LinkSide side = link_side(*cut, axis, end, body.lattice().spacing);
-  SurfaceHit hit{side.point, side.normal};
+  SurfaceHit hit{side.point, side.normal, side.cut_id != 0};
   for (int d = 0; d < 3; ++d) hit.point[d] += (low >> d & 1) - 0.5;
   return hit;
 }

@@ -9,105 +9,149 @@
 namespace kerf {
 namespace {
 
+using Vec = Eigen::Vector3d;
+using Mat = Eigen::Matrix3d;
+using Eigenvalues = Eigen::SelfAdjointEigenSolver<Mat>;
+
 /// Eigenvalues below this part of the largest belong to directions along the surface; the square of
 /// the least angle between normals, about, that makes an edge.
 constexpr double kSmooth = 0.01;
 constexpr double kHalf = 0.5;
 
-/// The sum of squares as x^T A x - 2 b^T x + const, x counted from the mean of the points.
-struct Quadric {
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+Vec to_eigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
-  double energy(const Eigen::Vector3d& x) const { return x.dot(a * x) - 2 * b.dot(x); }
+bool in_cube(const Vec& x) { return (x.array().abs() <= kHalf).all(); }
+
+/// The hits of one kind: sum_i (n_i . (x - p_i))^2 = x^T A x - 2 b^T x + const.
+struct Quadric {
+  Mat a = Mat::Zero();
+  Vec b = Vec::Zero();
+  Vec mean = Vec::Zero();
+  int hits = 0;
+  bool flat = true;  // all normals are the same
+  Vec3d normal{};
+  Eigenvalues eigen;   // of A, unless flat
+  double largest = 0;  // eigenvalue
+
+  Quadric(std::span<const SurfaceHit> all, bool firm) {
+    for (const SurfaceHit& hit : all) {
+      if (hit.firm != firm) continue;
+      if (hits == 0) normal = hit.normal;
+      flat = flat && hit.normal == normal;
+      const Vec n = to_eigen(hit.normal), p = to_eigen(hit.point);
+      a += n * n.transpose();
+      b += n.dot(p) * n;
+      mean += p;
+      ++hits;
+    }
+    if (hits == 0) return;
+    mean /= hits;
+    largest = hits * dot(normal, normal);
+    if (flat) return;  // the common case, without eigenvectors
+    eigen.compute(a);
+    largest = eigen.eigenvalues()[2];
+  }
+
+  double energy(const Vec& x) const { return x.dot(a * x) - 2 * b.dot(x); }
 };
 
-/// The least x with `free` components unknown and the others given; smooth directions stay 0.
-/// `largest` is the eigenvalue of the whole quadric that counts as one.
-Eigen::Vector3d solve(const Quadric& q, Eigen::Vector3d x, unsigned free, double largest) {
-  Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+/// A^-1 b over the directions that count: those with eigenvalues that are not small.
+Vec apply_inverse(const Eigenvalues& eigen, double largest, const Vec& b) {
+  Vec x = Vec::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double value = eigen.eigenvalues()[k];
+    if (!(value > kSmooth * largest)) continue;
+    const Vec along = eigen.eigenvectors().col(k);
+    x += along.dot(b) / value * along;
+  }
+  return x;
+}
+
+/// The least x with `free` components unknown and the others given, nearest to the mean in
+/// directions that do not count.
+Vec solve(const Quadric& q, Vec x, unsigned free) {
+  Mat a = Mat::Zero();
+  Vec b = Vec::Zero();
   for (int i = 0; i < 3; ++i) {
     if ((free >> i & 1) == 0) continue;
     b[i] = q.b[i];
     for (int j = 0; j < 3; ++j) {
-      if ((free >> j & 1) != 0)
-        a(i, j) = q.a(i, j);
-      else
-        b[i] -= q.a(i, j) * x[j];
+      const bool unknown = (free >> j & 1) != 0;
+      b[i] -= q.a(i, j) * (unknown ? q.mean[j] : x[j]);
+      if (unknown) a(i, j) = q.a(i, j);
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(a);
-  Eigen::Vector3d y = Eigen::Vector3d::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const double value = eigen.eigenvalues()[k];
-    if (!(value > kSmooth * largest)) continue;
-    const Eigen::Vector3d along = eigen.eigenvectors().col(k);
-    y += along.dot(b) / value * along;
-  }
+  const Vec step = apply_inverse(Eigenvalues(a), q.largest, b);
   for (int i = 0; i < 3; ++i)
-    if ((free >> i & 1) != 0) x[i] = y[i];
+    if ((free >> i & 1) != 0) x[i] = q.mean[i] + step[i];
   return x;
 }
 
-/// The least energy over the faces, edges and corners of the cube [lo, hi].
-Eigen::Vector3d solve_on_boundary(const Quadric& q, const Eigen::Vector3d& lo,
-                                  const Eigen::Vector3d& hi, double largest) {
-  Eigen::Vector3d best = Eigen::Vector3d::Zero();
+/// The least energy over the faces, edges and corners of the cube.
+Vec solve_on_boundary(const Quadric& q) {
+  Vec best = q.mean;
   double least = std::numeric_limits<double>::infinity();
-  for (int part = 0; part < 27; ++part) {  // per axis: free, at lo, at hi
+  for (int part = 1; part < 27; ++part) {  // per axis: free, at the low side, at the high side
     const int state[3] = {part % 3, part / 3 % 3, part / 9};
     unsigned free = 0;
-    Eigen::Vector3d x = Eigen::Vector3d::Zero();
+    Vec x = Vec::Zero();
     for (int d = 0; d < 3; ++d) {
       if (state[d] == 0) free |= 1u << d;
-      if (state[d] == 1) x[d] = lo[d];
-      if (state[d] == 2) x[d] = hi[d];
+      if (state[d] != 0) x[d] = state[d] == 1 ? -kHalf : kHalf;
     }
-    if (free == 7) continue;
-    x = solve(q, x, free, largest);
-    bool inside = true;
-    for (int d = 0; d < 3; ++d) inside = inside && lo[d] <= x[d] && x[d] <= hi[d];
+    x = solve(q, x, free);
     const double energy = q.energy(x);
-    if (!inside || !(energy < least)) continue;
+    if (!in_cube(x) || !(energy < least)) continue;
     least = energy;
     best = x;
   }
   return best;
 }
 
-bool all_alike(std::span<const SurfaceHit> hits) {
-  return std::all_of(hits.begin(), hits.end(),
-                     [&](const SurfaceHit& h) { return h.normal == hits[0].normal; });
+Vec fit(const Quadric& q) {
+  if (q.flat || !(q.largest > 0)) return q.mean;
+  const Vec x = q.mean + apply_inverse(q.eigen, q.largest, q.b - q.a * q.mean);
+  return in_cube(x) ? x : solve_on_boundary(q);
+}
+
+/// From x, which lies in the cube, towards y until the cube ends.
+Vec stay_in_cube(const Vec& x, const Vec& y) {
+  double part = 1;
+  for (int d = 0; d < 3; ++d) {
+    if (y[d] > kHalf) part = std::min(part, (kHalf - x[d]) / (y[d] - x[d]));
+    if (y[d] < -kHalf) part = std::min(part, (-kHalf - x[d]) / (y[d] - x[d]));
+  }
+  return x + std::max(part, 0.0) * (y - x);
+}
+
+/// Fits `soft` in the directions that `firm` leaves open.
+Vec fit_along(const Quadric& firm, const Quadric& soft) {
+  const Vec x = fit(firm);
+  Mat open = Mat::Zero();  // projects onto those directions
+  if (firm.flat) {
+    const Vec n = to_eigen(firm.normal);
+    open = Mat::Identity() - n * n.transpose() / std::max(n.squaredNorm(), 1e-300);
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      const Vec along = firm.eigen.eigenvectors().col(k);
+      if (!(firm.eigen.eigenvalues()[k] > kSmooth * firm.largest))
+        open += along * along.transpose();
+    }
+  }
+  const Vec mean = (firm.hits * firm.mean + soft.hits * soft.mean) / (firm.hits + soft.hits);
+  const Vec start = stay_in_cube(x, x + open * (mean - x));
+  const Vec step = apply_inverse(Eigenvalues(open * soft.a * open), soft.largest,
+                                 open * (soft.b - soft.a * start));
+  return stay_in_cube(start, start + open * step);
 }
 
 }  // namespace
 
 Vec3d fit_vertex(std::span<const SurfaceHit> hits) {
-  Vec3d mean{};
-  for (const SurfaceHit& hit : hits) mean += hit.point;
-  mean *= 1.0 / static_cast<double>(hits.size());
-  if (all_alike(hits)) return mean;  // the common case, and it spares the eigenvalues
-
-  Quadric q;
-  for (const SurfaceHit& hit : hits) {
-    const Eigen::Vector3d n{hit.normal.x, hit.normal.y, hit.normal.z};
-    q.a += n * n.transpose();
-    q.b += dot(hit.normal, hit.point - mean) * n;
-  }
-  const double largest =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(q.a, Eigen::EigenvaluesOnly).eigenvalues()[2];
-  if (!(largest > 0)) return mean;
-  Eigen::Vector3d lo, hi;
-  for (int d = 0; d < 3; ++d) {
-    lo[d] = -kHalf - mean[d];
-    hi[d] = kHalf - mean[d];
-  }
-  Eigen::Vector3d x = solve(q, Eigen::Vector3d::Zero(), 7, largest);
-  if (!((x.array() >= lo.array()).all() && (x.array() <= hi.array()).all()))
-    x = solve_on_boundary(q, lo, hi, largest);
+  const Quadric firm(hits, true), soft(hits, false);
+  const Vec x = firm.hits == 0 ? fit(soft) : soft.hits == 0 ? fit(firm) : fit_along(firm, soft);
   Vec3d out;
-  for (int d = 0; d < 3; ++d) out[d] = std::clamp(mean[d] + x[d], -kHalf, kHalf);
+  for (int d = 0; d < 3; ++d) out[d] = std::clamp(x[d], -kHalf, kHalf);
   return out;
 }
 
