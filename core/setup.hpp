@@ -105,6 +105,13 @@ struct SolverSetup {
   int threads = 0;              ///< 0: all
 };
 
+/// How the surface is drawn on the dual grid of links. Source  [DGW11] section 7, [WWD15] 2.3.2.
+enum class SurfaceMethod {
+  none,              ///< no surface
+  dual_contouring,   ///< a vertex for each side of a cut in each dual cell
+  splitting_cubes,   ///< two vertices for each cut link, and one in the middle of each patch
+};
+
 struct SimulationSetup {
   BodySetup body;
   Material material;
@@ -114,6 +121,7 @@ struct SimulationSetup {
   std::vector<CutSetup> cuts;
   TimeSetup time;
   SolverSetup solver;
+  SurfaceMethod surface = SurfaceMethod::dual_contouring;
 };
 
 /// @throws Error (bad_input) that names the first field that makes no sense, and its remedy.

@@ -422,6 +422,8 @@ Snapshot Simulation::snapshot() const {
   return out;
 }
 
+SurfaceMesh Simulation::surface_mesh() const { return {}; }
+
 std::uint64_t Simulation::state_hash() const {
   // FNV-1a over the bits, in vertex order.
   std::uint64_t hash = 0xCBF29CE484222325U;

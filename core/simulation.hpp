@@ -22,6 +22,7 @@
 #include "core/body/linked_octree.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/setup.hpp"
+#include "core/surface/surface_mesh.hpp"
 
 namespace kerf {
 
@@ -104,6 +105,8 @@ class Simulation {
   const std::vector<std::string>& warnings() const;
 
   Snapshot snapshot() const;
+  /// The surface as it lies now; empty if the setup asks for none.
+  SurfaceMesh surface_mesh() const;
   /// Hash of displacement and velocity as double bits, in vertex order.
   std::uint64_t state_hash() const;
   /// Volume of the cells, m^3; cuts do not change it.
