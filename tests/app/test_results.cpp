@@ -1,25 +1,22 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "app/preview.hpp"
 #include "app/preview_surface.hpp"
 #include "app/progress.hpp"
 #include "app/results.hpp"
 #include "core/base/error.hpp"
+#include "tests/support/files.hpp"
 
 namespace kerf {
 namespace {
 
 namespace fs = std::filesystem;
+using test::read_all;
+using test::vtk_array;
 
 /// Two unit cells side by side along x that share no vertex: the link between them is cut.
 Snapshot two_cut_cells() {
@@ -49,46 +46,9 @@ Snapshot two_cut_cells() {
   return s;
 }
 
-std::string read_all(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-/// The values of one array of a .vtu, found as a reader would: by its offset in the appended data.
-template <class T>
-std::vector<T> vtu_array(const std::string& vtu, const std::string& name) {
-  std::smatch match;
-  const std::regex pattern("Name=\"" + name + "\"[^>]*offset=\"([0-9]+)\"");
-  const std::string head = vtu.substr(0, vtu.find("<AppendedData"));
-  EXPECT_TRUE(std::regex_search(head, match, pattern)) << name;
-  const std::size_t data = vtu.find('_', vtu.find("<AppendedData")) + 1;
-  const std::size_t at = data + std::stoul(match[1]);
-  std::uint64_t bytes = 0;
-  std::memcpy(&bytes, vtu.data() + at, sizeof bytes);
-  std::vector<T> values(bytes / sizeof(T));
-  std::memcpy(values.data(), vtu.data() + at + sizeof bytes, bytes);
-  return values;
-}
-
-class ResultsTest : public testing::Test {
+class ResultsTest : public test::FolderTest {
  protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    root_ =
-        fs::path(testing::TempDir()) / ("kerf_results_" + std::to_string(getpid()) + info->name());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-  std::vector<std::string> names(const fs::path& folder) {
-    std::vector<std::string> all;
-    for (const auto& entry : fs::directory_iterator(folder))
-      all.push_back(entry.path().filename().string());
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-  void touch(const fs::path& file) { std::ofstream(file) << "x"; }
-  fs::path root_;
+  void touch(const fs::path& file) { test::write_all(file, "x"); }
 };
 
 TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
@@ -97,9 +57,9 @@ TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
   const std::string vtu = read_all(root_ / "a.vtu");
 
   EXPECT_NE(vtu.find("NumberOfPoints=\"16\" NumberOfCells=\"2\""), std::string::npos);
-  const auto points = vtu_array<double>(vtu, "Points");
-  const auto force = vtu_array<double>(vtu, "external_force");
-  const auto displacement = vtu_array<double>(vtu, "displacement");
+  const auto points = vtk_array<double>(vtu, "Points", "Points");
+  const auto force = vtk_array<double>(vtu, "PointData", "external_force");
+  const auto displacement = vtk_array<double>(vtu, "PointData", "displacement");
   ASSERT_EQ(points.size(), 48u);
   ASSERT_EQ(displacement.size(), 48u);
   for (std::size_t i = 0; i < 16; ++i) {
@@ -107,23 +67,24 @@ TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
     EXPECT_EQ(displacement[3 * i + 1], s.displacement[i].y);
     EXPECT_EQ(force[3 * i + 1], -1.0 / 3.0);
   }
-  EXPECT_EQ(vtu_array<double>(vtu, "velocity")[47], 1.0);
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "fixed")[0], 7);
-  const auto masters = vtu_array<std::int32_t>(vtu, "masters");
+  EXPECT_EQ(vtk_array<double>(vtu, "PointData", "velocity")[47], 1.0);
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "PointData", "fixed")[0], 7);
+  const auto masters = vtk_array<std::int32_t>(vtu, "PointData", "masters");
   ASSERT_EQ(masters.size(), 64u);
   EXPECT_EQ(std::vector<std::int32_t>(masters.begin() + 12, masters.begin() + 16),
             (std::vector<std::int32_t>{0, 1, -1, -1}));
   // VTK numbers the corners of a hexahedron around the bottom, then around the top.
-  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "connectivity"),
+  EXPECT_EQ(vtk_array<std::int32_t>(vtu, "Cells", "connectivity"),
             (std::vector<std::int32_t>{0, 1, 3, 2, 4, 5, 7, 6, 8, 9, 11, 10, 12, 13, 15, 14}));
-  EXPECT_EQ(vtu_array<std::int64_t>(vtu, "offsets"), (std::vector<std::int64_t>{8, 16}));
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "types"), (std::vector<std::uint8_t>{12, 12}));
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "level"), (std::vector<std::uint8_t>{0, 0}));
-  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "piece"), (std::vector<std::int32_t>{0, 1}));
-  EXPECT_EQ(vtu_array<double>(vtu, "youngs_modulus"), (std::vector<double>{1e4, 1e4 + 1}));
-  EXPECT_EQ(vtu_array<double>(vtu, "poissons_ratio")[1], 0.4);
-  EXPECT_EQ(vtu_array<double>(vtu, "density")[0], 1000);
-  const auto rotation = vtu_array<double>(vtu, "rotation");
+  EXPECT_EQ(vtk_array<std::int64_t>(vtu, "Cells", "offsets"), (std::vector<std::int64_t>{8, 16}));
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "Cells", "types"), (std::vector<std::uint8_t>{12, 12}));
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "CellData", "level"), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(vtk_array<std::int32_t>(vtu, "CellData", "piece"), (std::vector<std::int32_t>{0, 1}));
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "youngs_modulus"),
+            (std::vector<double>{1e4, 1e4 + 1}));
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "poissons_ratio")[1], 0.4);
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "density")[0], 1000);
+  const auto rotation = vtk_array<double>(vtu, "CellData", "rotation");
   ASSERT_EQ(rotation.size(), 18u);
   EXPECT_EQ(rotation[13], 1.0);
 }
