@@ -10,6 +10,8 @@
 #include "app/results.hpp"
 #include "core/base/error.hpp"
 #include "tests/support/files.hpp"
+#include "tests/support/scenes.hpp"
+#include "tests/support/surfaces.hpp"
 
 namespace kerf {
 namespace {
@@ -96,6 +98,9 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
   summary.state_hash = 0xabcULL;
   summary.level_cells = {8, 1};
   summary.level_vertices = {27, 8};
+  summary.surface = SurfaceMethod::splitting_cubes;
+  summary.surface_points = 12;
+  summary.surface_triangles = 20;
   summary.seconds = {{"solve", 1.5}};
   summary.warnings = {"w"};
   StepReport step;
@@ -119,6 +124,10 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_EQ(json["state_hash"], "0000000000000abc");
   EXPECT_EQ(json["levels"], 2);
+  EXPECT_EQ(json["surface"]["method"], "splitting-cubes");
+  EXPECT_EQ(json["surface"]["points"], 12);
+  EXPECT_EQ(json["surface"]["triangles"], 20);
+  EXPECT_EQ(nlohmann::json::parse(to_json({}))["surface"]["method"], "none");
   EXPECT_EQ(json["bytes_per_cell"], 8.0);
   EXPECT_EQ(json["seconds"]["solve"], 1.5);
   EXPECT_EQ(json["steps"][0]["cycles"], 9);
@@ -133,13 +142,58 @@ TEST_F(ResultsTest, CommitGivesNamesAndTheSeries) {
     ResultsFolder results(out, {});
     results.add_snapshot(0, 0.0, two_cut_cells());
     results.add_snapshot(12, 0.25, two_cut_cells());
+    EXPECT_EQ(results.add_surface(12, 0.25, test::two_tetrahedra()), "");
     for (const auto& name : names(out)) EXPECT_EQ(name.front(), '.') << "not finished: " << name;
     results.commit({});
   }
-  EXPECT_EQ(names(out), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0012.vtu",
-                                                  "summary.json"}));
+  EXPECT_EQ(names(out),
+            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0012.vtu", "summary.json",
+                                      "surface.pvd", "surface_0012.vtp"}));
   const std::string pvd = read_all(out / "body.pvd");
   EXPECT_NE(pvd.find("timestep=\"0.25\" part=\"0\" file=\"body_0012.vtu\""), std::string::npos);
+  const std::string surfaces = read_all(out / "surface.pvd");
+  EXPECT_NE(surfaces.find("timestep=\"0.25\" part=\"0\" file=\"surface_0012.vtp\""),
+            std::string::npos);
+  EXPECT_EQ(surfaces.find("body_"), std::string::npos);
+}
+
+/// All formats of surfaces and figures, none of bodies.
+OutputSettings surfaces_and_figures() {
+  OutputSettings settings;
+  settings.vtu = settings.pvd = false;
+  settings.ply = settings.glb = settings.levels = settings.links = true;
+  return settings;
+}
+
+TEST_F(ResultsTest, SurfacesAndFiguresHaveTheirNames) {
+  const LinkedOctree body = test::scene("half_cut");
+  Hierarchy hierarchy;
+  hierarchy.levels.push_back(finest_level(body));
+  build_coarse_levels(hierarchy, {.coarsest_vertices = 1, .max_levels = 2});
+  const std::vector<Vec3d> corners(8 * body.leaf_count());
+  ResultsFolder results(root_, surfaces_and_figures());
+
+  results.add_snapshot(3, 0.1, two_cut_cells());
+  EXPECT_EQ(results.add_surface(3, 0.1, test::two_tetrahedra()), "");
+  results.add_figures(3, body, hierarchy, corners);
+  results.commit({});
+
+  EXPECT_EQ(names(root_),
+            (std::vector<std::string>{"level_0_0003.vtu", "level_1_0003.vtu", "links_0003.vtp",
+                                      "summary.json", "surface_0003.glb", "surface_0003.ply",
+                                      "surface_0003.vtp"}));
+}
+
+TEST_F(ResultsTest, ASurfaceBeyondSinglePrecisionIsKeptWithoutItsGlb) {
+  SurfaceMesh surface = test::two_tetrahedra();
+  surface.displacement[0].x = std::numeric_limits<double>::infinity();
+  ResultsFolder results(root_, surfaces_and_figures());
+
+  EXPECT_EQ(results.add_surface(3, 0.1, surface), "no surface_0003.glb: the body reaches too far");
+  results.commit({});
+
+  EXPECT_EQ(names(root_),
+            (std::vector<std::string>{"summary.json", "surface_0003.ply", "surface_0003.vtp"}));
 }
 
 TEST_F(ResultsTest, WithoutCommitNothingRemains) {
@@ -163,15 +217,35 @@ TEST_F(ResultsTest, WithoutCommitAnEarlierRunStays) {
 
 TEST_F(ResultsTest, StaleFilesOfOursGoOthersStay) {
   ResultsFolder(root_, {}).commit({});  // an earlier run was here
-  for (const char* name : {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "body_x.vtu",
-                           "my_body_0001.vtu", "notes.txt", "body_12.vtu"})
+  for (const char* name :
+       {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "surface_0003.vtp",
+        "surface_0003.ply", "surface_12345.glb", ".surface_0004.glb.partial", "level_0_0003.vtu",
+        "level_12_0003.vtu", ".level_1_0003.vtu.partial", "links_0000.vtp", "frame_0001.png"})
     touch(root_ / name);
+  const std::vector<std::string> others = {
+      "body_12.vtu",      "body_x.vtu",      "frame_1.png",      "frame_0001.jpg",
+      "level_0003.vtu",   "level__0003.vtu", "level_a_0003.vtu", "links_0000.vtu",
+      "my_body_0001.vtu", "notes.txt",       "surface_.vtp",     "surface_0003.obj"};
+  for (const auto& name : others) touch(root_ / name);
+
   ResultsFolder results(root_, {});
   results.add_snapshot(0, 0.0, two_cut_cells());
   results.commit({});
-  EXPECT_EQ(names(root_),
-            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_12.vtu", "body_x.vtu",
-                                      "my_body_0001.vtu", "notes.txt", "summary.json"}));
+
+  std::vector<std::string> expected = others;
+  for (const char* name : {"body.pvd", "body_0000.vtu", "summary.json", "surface.pvd"})
+    expected.push_back(name);
+  std::sort(expected.begin(), expected.end());
+  EXPECT_EQ(names(root_), expected);
+}
+
+TEST_F(ResultsTest, TheSeriesOfAnEarlierRunGoes) {
+  ResultsFolder(root_, {}).commit({});
+  ASSERT_TRUE(fs::exists(root_ / "surface.pvd"));
+  OutputSettings bodies;
+  bodies.vtp = false;
+  ResultsFolder(root_, bodies).commit({});
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"body.pvd", "summary.json"}));
 }
 
 TEST_F(ResultsTest, WhereNoRunWasNothingGoes) {
@@ -181,7 +255,7 @@ TEST_F(ResultsTest, WhereNoRunWasNothingGoes) {
   results.add_snapshot(0, 0.0, two_cut_cells());
   results.commit({});
   EXPECT_EQ(names(root_), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0042.vtu",
-                                                    "preview.png", "summary.json"}));
+                                                    "preview.png", "summary.json", "surface.pvd"}));
 }
 
 TEST_F(ResultsTest, FolderInPlaceOfAFileChangesNothing) {
