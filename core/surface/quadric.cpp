@@ -118,13 +118,23 @@ Vec solve_on_boundary(const Quadric& first, const Quadric& second, const Vec& me
     least = std::min(least, place.first);
     places[count++] = place;
   }
-  // Of those that fit the first hits about as well, the one that fits the second best.
-  constexpr double kAlike = 4, kExact = 1e-12;  // squares of distances
-  const double limit = second.hits == 0 ? least : kAlike * std::max(least, 0.0) + kExact;
-  const Place* best = nullptr;
-  for (const Place& place : std::span(places.data(), count))
-    if (place.first <= limit && (best == nullptr || place.second < best->second)) best = &place;
-  return best == nullptr ? mean : best->x;
+  // Of those that fit the first hits about as well, those that fit the second best; of these, as
+  // the two ends of an edge that runs through the cube, the nearest to the mean.
+  constexpr double kAlike = 4, kTie = 1e-12;  // squares of distances
+  const double limit = (second.hits == 0 ? 1 : kAlike) * std::max(least, 0.0) + kTie;
+  double least_second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count; ++i)
+    if (places[i].first <= limit) least_second = std::min(least_second, places[i].second);
+  Vec best = mean;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double distance = (places[i].x - mean).squaredNorm();
+    if (places[i].first > limit || places[i].second > least_second + kTie || distance >= nearest)
+      continue;
+    nearest = distance;
+    best = places[i].x;
+  }
+  return best;
 }
 
 Vec fit(const Quadric& first, const Quadric& second) {
