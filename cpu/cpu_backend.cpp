@@ -16,10 +16,10 @@
 #include "core/solve/sparse_cholesky.hpp"
 #include "core/solve/spectrum.hpp"
 #include "cpu/level_store.hpp"
+#include "cpu/surface_loops.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/relax.hpp"
 #include "kernels/rotation.hpp"
-#include "kernels/surface.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
@@ -319,44 +319,12 @@ void CpuBackend::elastic_force(int displacement, int out) {
 
 void CpuBackend::move_points(std::span<const BoundPoint> points, int displacement,
                              std::span<Vec3d> positions) {
-  const Level& level = *levels_[0].level;
-  const double* u = data(0, displacement);
-  parallel(
-      static_cast<std::int32_t>(points.size()),
-      [&](std::int32_t p) {
-        const BoundPoint& point = points[p];
-        positions[p] = point.reference;
-        if (point.cell < 0) return;
-        Vec at[8], corners[8];
-        for (int i = 0; i < 8; ++i) at[i] = cpu::load(u, level.slots[point.cell][i]);
-        kernels::unfold(at, level.fold[point.cell], corners);
-        positions[p] += kernels::trilinear(corners, point.local);
-      },
-      kWorthVertices);
+  cpu::move_points(*levels_[0].level, points, data(0, displacement), positions, threads_);
 }
 
 void CpuBackend::surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
                                  std::span<Vec3d> normals) {
-  faces_.resize(surface.triangles.size());
-  parallel(
-      static_cast<std::int32_t>(surface.triangles.size()),
-      [&](std::int32_t t) {
-        const auto& [a, b, c] = surface.triangles[t];
-        faces_[t] = kernels::area_normal(positions[a], positions[b], positions[c]);
-      },
-      kWorthVertices);
-  parallel(
-      static_cast<std::int32_t>(surface.points.size()),
-      [&](std::int32_t p) {
-        for (std::int32_t c = surface.first_corner[p]; c >= 0;) {
-          const std::int32_t normal = surface.normal_of[c];
-          Vec sum{};
-          for (; c >= 0 && surface.normal_of[c] == normal; c = surface.next_corner[c])
-            sum += faces_[c / 3];
-          normals[normal] = kernels::unit_or_z(sum);
-        }
-      },
-      kWorthVertices);
+  cpu::surface_normals(surface, positions, normals, faces_, threads_);
 }
 
 double CpuBackend::residual(int level) {

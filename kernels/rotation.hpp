@@ -42,8 +42,8 @@ KERF_HD Mat3<T> mean_gradient(const Vec3<T> (&u)[kCorners], T side) {
 template <class T>
 struct RotationStep {
   Quat<T> next;
-  T length2;    // of the rotation vector, radians squared
-  bool ascent;  // tr(S) I - S was safely positive definite
+  T length2;                     // of the rotation vector, radians squared
+  decltype(T(0) < T(0)) ascent;  // tr(S) I - S was safely positive definite
 };
 
 /// One Newton step for the maximum of tr(R^T F): omega = (tr(S) I - S)^-1 axial(R^T F), applied as

@@ -15,6 +15,7 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
   smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
   smoother.omega = setup.omega;
   backend_.set_smoother(smoother);
+  residual_ = backend_.add_vector();
   if (setup.method == SolverMethod::cg || setup.method == SolverMethod::cg_jacobi) {
     direction_ = backend_.add_vector();
     product_ = backend_.add_vector();
@@ -64,9 +65,9 @@ void LinearSolver::refresh() {
 }
 
 double LinearSolver::true_residual(int b, int x) {
-  backend_.apply(0, x, kRight);
-  backend_.combine(0, 1, b, -1, kRight);
-  return std::sqrt(backend_.dot(0, kRight, kRight));
+  backend_.apply(0, x, residual_);
+  backend_.combine(0, 1, b, -1, residual_);
+  return std::sqrt(backend_.dot(0, residual_, residual_));
 }
 
 SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
@@ -91,8 +92,9 @@ SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference)
   return conjugate_gradients(b, x, goal, reference, false);
 }
 
-// z = B r: r is kRight, z becomes kSolution.
+// z = B r: r is the residual, z becomes kSolution. The cycle may be of another precision.
 void LinearSolver::precondition(bool jacobi) {
+  backend_.copy(0, residual_, kRight);
   if (jacobi) {
     backend_.precondition_jacobi(0, kRight, kSolution);
     return;
@@ -102,7 +104,7 @@ void LinearSolver::precondition(bool jacobi) {
 }
 
 // Flexible conjugate gradients: beta from the change of the residual (Polak, Ribiere), because the
-// K-cycle is not quite linear. r lives in kRight, where the cycle reads its right-hand side.
+// K-cycle is not quite linear.
 SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double reference,
                                              bool jacobi) {
   const bool fixed = setup_.cycles > 0;
@@ -117,7 +119,7 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
     bool first = true;
     while (stats.cycles < limit && (fixed || norm > goal)) {
       precondition(jacobi);
-      const double rho_next = backend_.dot(0, kSolution, kRight);
+      const double rho_next = backend_.dot(0, kSolution, residual_);
       if (!(rho_next > 0)) break;  // r is zero, or rounding has won
       if (first) {
         backend_.copy(0, kSolution, direction_);
@@ -130,10 +132,10 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
       const double curvature = backend_.dot(0, direction_, product_);
       if (!(curvature > 0)) break;
       rho = rho_next;
-      alpha = backend_.dot(0, direction_, kRight) / curvature;
+      alpha = backend_.dot(0, direction_, residual_) / curvature;
       backend_.add(0, alpha, direction_, x);
-      backend_.add(0, -alpha, product_, kRight);
-      norm = std::sqrt(backend_.dot(0, kRight, kRight));
+      backend_.add(0, -alpha, product_, residual_);
+      norm = std::sqrt(backend_.dot(0, residual_, residual_));
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / reference);
     }
@@ -151,8 +153,7 @@ SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) 
   SolveStats stats;
   double norm = true_residual(b, x);
   while (stats.cycles < limit && (fixed || norm > goal)) {
-    backend_.zero(0, kSolution);
-    cycle_->run();
+    precondition(false);
     backend_.add(0, 1, kSolution, x);
     norm = true_residual(b, x);
     ++stats.cycles;
@@ -170,11 +171,11 @@ SolveStats LinearSolver::direct(int b, int x, double goal, double reference) {
   SolveStats stats;
   double norm = true_residual(b, x);
   do {
-    backend_.read(0, kRight, right);
+    backend_.read(0, residual_, right);
     cholesky_->solve(right, solution);
-    backend_.write(0, kSolution, solution);
-    backend_.mask(0, kSolution);
-    backend_.add(0, 1, kSolution, x);
+    backend_.write(0, residual_, solution);
+    backend_.mask(0, residual_);
+    backend_.add(0, 1, residual_, x);
     norm = true_residual(b, x);
     ++stats.cycles;
   } while (norm > goal && stats.cycles <= kRefinements);

@@ -60,6 +60,7 @@ class LinearSolver {
   std::unique_ptr<Cycle> cycle_;
   std::unique_ptr<AssembledLevel> assembled_;
   std::unique_ptr<SparseCholesky> cholesky_;
+  int residual_ = -1;                  // the true one, or the recursion of conjugate gradients
   int direction_ = -1, product_ = -1;  // of conjugate gradients
   SolverTimes times_;
   Progress progress_;

@@ -72,7 +72,7 @@ std::string name_of(const ::testing::TestParamInfo<Parameters>& parameters) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, Operators,
-                         ::testing::Combine(::testing::Values("cpu"),
+                         ::testing::Combine(::testing::Values("cpu", "fast"),
                                             ::testing::Values("one_cell", "uniform", "floating",
                                                               "bar", "octree1", "octree2",
                                                               "half_cut", "crossed", "limbs")),
@@ -310,7 +310,7 @@ TEST_P(Operators, RigidMotionGivesNoForce) {
 class Spectrum : public ::testing::TestWithParam<Parameters> {};
 
 INSTANTIATE_TEST_SUITE_P(Backends, Spectrum,
-                         ::testing::Combine(::testing::Values("cpu"),
+                         ::testing::Combine(::testing::Values("cpu", "fast"),
                                             ::testing::Values("one_cell", "uniform", "floating",
                                                               "small_octree", "small_cut")),
                          name_of);

@@ -11,6 +11,7 @@
 
 #include "core/backend.hpp"
 #include "cpu/cpu_backend.hpp"
+#include "cpu/fast_backend.hpp"
 #include "tests/oracle/system_oracle.hpp"
 #include "tests/support/scenes.hpp"
 
@@ -20,6 +21,8 @@ namespace kerf::test {
 inline std::unique_ptr<Backend> make_backend(const std::string& name, int threads = 1,
                                              int tile_log2 = 0) {
   if (name == "cpu") return make_cpu_backend({threads, tile_log2});
+  if (name == "fast") return make_fast_backend({threads, false});
+  if (name == "mixed") return make_fast_backend({threads, true});
   return nullptr;
 }
 

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+//
+// A SIMD pack that the bodies of kernels/ take for a scalar: one cell in each lane.
+//
+// Layout  256 bits: 8 floats or 4 doubles. Without AVX2 the compiler splits packs; the results are
+//         the same bits, since every lane does what a scalar would.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+
+#include "kernels/fma.hpp"
+#include "kernels/mat3.hpp"
+
+#if defined(__AVX2__) && defined(__FMA__)
+#include <immintrin.h>
+#define KERF_AVX2 1
+#else
+#define KERF_AVX2 0
+#endif
+
+namespace kerf::cpu {
+
+inline constexpr int kPackBytes = 32;
+
+/// Lane by lane all ones or all zeros.
+template <class S>
+struct PackMask {
+  using Int = std::conditional_t<sizeof(S) == 4, std::int32_t, std::int64_t>;
+  typedef Int Vector __attribute__((vector_size(kPackBytes)));
+  Vector v;
+
+  friend PackMask operator&&(const PackMask& a, const PackMask& b) { return {a.v & b.v}; }
+  friend PackMask operator||(const PackMask& a, const PackMask& b) { return {a.v | b.v}; }
+  friend PackMask operator!(const PackMask& a) { return {~a.v}; }
+};
+
+template <class S>
+struct Pack {
+  using Scalar = S;
+  static constexpr int kLanes = kPackBytes / static_cast<int>(sizeof(S));
+  typedef S Vector __attribute__((vector_size(kPackBytes)));
+  Vector v{};
+
+  Pack() = default;
+  Pack(const Vector& vector) : v(vector) {}  // NOLINT: packs and vectors are one thing
+  template <class Number>
+  requires std::is_arithmetic_v<Number>
+  explicit Pack(Number s) : v(static_cast<S>(s) - Vector{}) {}
+
+  S operator[](int lane) const { return v[lane]; }
+  void set(int lane, S value) { v[lane] = value; }
+
+  Pack& operator+=(const Pack& b) {
+    v += b.v;
+    return *this;
+  }
+  Pack& operator-=(const Pack& b) {
+    v -= b.v;
+    return *this;
+  }
+  Pack& operator*=(const Pack& b) {
+    v *= b.v;
+    return *this;
+  }
+  friend Pack operator+(const Pack& a, const Pack& b) { return a.v + b.v; }
+  friend Pack operator-(const Pack& a, const Pack& b) { return a.v - b.v; }
+  friend Pack operator*(const Pack& a, const Pack& b) { return a.v * b.v; }
+  friend Pack operator/(const Pack& a, const Pack& b) { return a.v / b.v; }
+  friend Pack operator-(const Pack& a) { return -a.v; }
+  friend PackMask<S> operator<(const Pack& a, const Pack& b) { return {a.v < b.v}; }
+  friend PackMask<S> operator>(const Pack& a, const Pack& b) { return {a.v > b.v}; }
+  friend PackMask<S> operator<=(const Pack& a, const Pack& b) { return {a.v <= b.v}; }
+};
+
+template <class S>
+Pack<S> select(const PackMask<S>& mask, const Pack<S>& a, const Pack<S>& b) {
+  return mask.v ? a.v : b.v;
+}
+
+template <class S>
+bool all(const PackMask<S>& mask) {
+  for (int i = 0; i < Pack<S>::kLanes; ++i)
+    if (mask.v[i] == 0) return false;
+  return true;
+}
+
+inline Pack<float> fma(const Pack<float>& a, const Pack<float>& b, const Pack<float>& c) {
+#if KERF_AVX2
+  return Pack<float>::Vector(_mm256_fmadd_ps(__m256(a.v), __m256(b.v), __m256(c.v)));
+#else
+  Pack<float> out;
+  for (int i = 0; i < 8; ++i) out.v[i] = __builtin_fmaf(a.v[i], b.v[i], c.v[i]);
+  return out;
+#endif
+}
+inline Pack<double> fma(const Pack<double>& a, const Pack<double>& b, const Pack<double>& c) {
+#if KERF_AVX2
+  return Pack<double>::Vector(_mm256_fmadd_pd(__m256d(a.v), __m256d(b.v), __m256d(c.v)));
+#else
+  Pack<double> out;
+  for (int i = 0; i < 4; ++i) out.v[i] = __builtin_fma(a.v[i], b.v[i], c.v[i]);
+  return out;
+#endif
+}
+inline Pack<float> sqrt(const Pack<float>& a) {
+#if KERF_AVX2
+  return Pack<float>::Vector(_mm256_sqrt_ps(__m256(a.v)));
+#else
+  Pack<float> out;
+  for (int i = 0; i < 8; ++i) out.v[i] = __builtin_sqrtf(a.v[i]);
+  return out;
+#endif
+}
+inline Pack<double> sqrt(const Pack<double>& a) {
+#if KERF_AVX2
+  return Pack<double>::Vector(_mm256_sqrt_pd(__m256d(a.v)));
+#else
+  Pack<double> out;
+  for (int i = 0; i < 4; ++i) out.v[i] = __builtin_sqrt(a.v[i]);
+  return out;
+#endif
+}
+
+template <class S>
+Pack<S> load_pack(const S* from) {
+  Pack<S> out;
+  __builtin_memcpy(&out.v, from, sizeof out.v);
+  return out;
+}
+template <class S>
+void store_pack(S* to, const Pack<S>& pack) {
+  __builtin_memcpy(to, &pack.v, sizeof pack.v);
+}
+
+/// One vector of each lane's vertex. Vectors are 3 scalars apart; the array has one scalar more
+/// than they need, since four are read.
+inline kernels::Vec3<Pack<float>> gather(const float* x, const std::int32_t* vertex) {
+#if KERF_AVX2
+  const auto pair = [&](int low, int high) {
+    return _mm256_insertf128_ps(
+        _mm256_castps128_ps256(_mm_loadu_ps(x + 3 * std::size_t(vertex[low]))),
+        _mm_loadu_ps(x + 3 * std::size_t(vertex[high])), 1);
+  };
+  const __m256 a = pair(0, 4), b = pair(1, 5), c = pair(2, 6), d = pair(3, 7);
+  const __m256 ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
+  const __m256 cd_low = _mm256_unpacklo_ps(c, d), cd_high = _mm256_unpackhi_ps(c, d);
+  using V = Pack<float>::Vector;
+  return {V(_mm256_shuffle_ps(ab_low, cd_low, 0x44)), V(_mm256_shuffle_ps(ab_low, cd_low, 0xEE)),
+          V(_mm256_shuffle_ps(ab_high, cd_high, 0x44))};
+#else
+  kernels::Vec3<Pack<float>> out;
+  for (int i = 0; i < 8; ++i)
+    for (int c = 0; c < 3; ++c) out[c].set(i, x[3 * std::size_t(vertex[i]) + std::size_t(c)]);
+  return out;
+#endif
+}
+inline kernels::Vec3<Pack<double>> gather(const double* x, const std::int32_t* vertex) {
+#if KERF_AVX2
+  const __m256d a = _mm256_loadu_pd(x + 3 * std::size_t(vertex[0]));
+  const __m256d b = _mm256_loadu_pd(x + 3 * std::size_t(vertex[1]));
+  const __m256d c = _mm256_loadu_pd(x + 3 * std::size_t(vertex[2]));
+  const __m256d d = _mm256_loadu_pd(x + 3 * std::size_t(vertex[3]));
+  const __m256d ab_low = _mm256_unpacklo_pd(a, b), ab_high = _mm256_unpackhi_pd(a, b);
+  const __m256d cd_low = _mm256_unpacklo_pd(c, d), cd_high = _mm256_unpackhi_pd(c, d);
+  using V = Pack<double>::Vector;
+  return {V(_mm256_permute2f128_pd(ab_low, cd_low, 0x20)),
+          V(_mm256_permute2f128_pd(ab_high, cd_high, 0x20)),
+          V(_mm256_permute2f128_pd(ab_low, cd_low, 0x31))};
+#else
+  kernels::Vec3<Pack<double>> out;
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) out[c].set(i, x[3 * std::size_t(vertex[i]) + std::size_t(c)]);
+  return out;
+#endif
+}
+
+/// Writes the lanes as records of four scalars one after the other; the fourth is zero.
+inline void scatter_records(float* to, const kernels::Vec3<Pack<float>>& f) {
+#if KERF_AVX2
+  const __m256 x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_ps();
+  const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
+  const __m256 z0_low = _mm256_unpacklo_ps(z, zero), z0_high = _mm256_unpackhi_ps(z, zero);
+  const __m256 r04 = _mm256_shuffle_ps(xy_low, z0_low, 0x44);
+  const __m256 r15 = _mm256_shuffle_ps(xy_low, z0_low, 0xEE);
+  const __m256 r26 = _mm256_shuffle_ps(xy_high, z0_high, 0x44);
+  const __m256 r37 = _mm256_shuffle_ps(xy_high, z0_high, 0xEE);
+  _mm256_storeu_ps(to, _mm256_permute2f128_ps(r04, r15, 0x20));
+  _mm256_storeu_ps(to + 8, _mm256_permute2f128_ps(r26, r37, 0x20));
+  _mm256_storeu_ps(to + 16, _mm256_permute2f128_ps(r04, r15, 0x31));
+  _mm256_storeu_ps(to + 24, _mm256_permute2f128_ps(r26, r37, 0x31));
+#else
+  for (int i = 0; i < 8; ++i) {
+    for (int c = 0; c < 3; ++c) to[4 * i + c] = f[c][i];
+    to[4 * i + 3] = 0;
+  }
+#endif
+}
+inline void scatter_records(double* to, const kernels::Vec3<Pack<double>>& f) {
+#if KERF_AVX2
+  const __m256d x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_pd();
+  const __m256d xy_low = _mm256_unpacklo_pd(x, y), xy_high = _mm256_unpackhi_pd(x, y);
+  const __m256d z0_low = _mm256_unpacklo_pd(z, zero), z0_high = _mm256_unpackhi_pd(z, zero);
+  _mm256_storeu_pd(to, _mm256_permute2f128_pd(xy_low, z0_low, 0x20));
+  _mm256_storeu_pd(to + 4, _mm256_permute2f128_pd(xy_high, z0_high, 0x20));
+  _mm256_storeu_pd(to + 8, _mm256_permute2f128_pd(xy_low, z0_low, 0x31));
+  _mm256_storeu_pd(to + 12, _mm256_permute2f128_pd(xy_high, z0_high, 0x31));
+#else
+  for (int i = 0; i < 4; ++i) {
+    for (int c = 0; c < 3; ++c) to[4 * i + c] = f[c][i];
+    to[4 * i + 3] = 0;
+  }
+#endif
+}
+
+}  // namespace kerf::cpu
+
+namespace kerf::kernels {
+template <class S>
+struct Precision<cpu::Pack<S>> {
+  static constexpr S kEpsilon = Precision<S>::kEpsilon;
+};
+}  // namespace kerf::kernels
