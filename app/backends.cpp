@@ -4,6 +4,7 @@
 #include "app/version.hpp"
 #include "core/base/error.hpp"
 #include "cpu/cpu_backend.hpp"
+#include "cpu/fast_backend.hpp"
 
 namespace kerf {
 
@@ -19,22 +20,31 @@ const char* precision_name(Precision precision) {
 }
 
 std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
-  expects(solver.precision == Precision::double_,
-          text("solver.precision = \"", precision_name(solver.precision),
-               "\": only \"double\" is available in this version"));
-  if (solver.backend == "cpu" || solver.backend == "auto")
-    return make_cpu_backend(CpuOptions{.threads = solver.threads});
-  expects(solver.backend == "cuda", text("solver.backend = \"", solver.backend,
-                                         "\": expected \"cpu\", \"cuda\" or \"auto\""));
-  throw Error(ErrorKind::unavailable,
-              "this version has no CUDA backend yet; set backend = "
-              "\"cpu\"");
+  const char* precision = precision_name(solver.precision);
+  expects(solver.precision != Precision::single,
+          text("solver.precision = \"", precision,
+               "\": \"double\" and \"mixed\" are available in this version"));
+  const bool mixed = solver.precision == Precision::mixed;
+  if (solver.backend == "cuda")
+    throw Error(ErrorKind::unavailable,
+                "this version has no CUDA backend yet; set backend = \"cpu\"");
+  const bool known =
+      solver.backend == "cpu" || solver.backend == "auto" || solver.backend == "reference";
+  expects(known, text("solver.backend = \"", solver.backend,
+                      "\": expected \"cpu\", \"reference\", \"cuda\" or \"auto\""));
+  // Gauss-Seidel is at home in the reference backend alone.
+  if (solver.backend != "reference" && solver.smoother == SmootherType::chebyshev)
+    return make_fast_backend({.threads = solver.threads, .single_cycle = mixed});
+  expects(!mixed, text("solver.precision = \"mixed\" needs solver.smoother = \"chebyshev\" and "
+                       "solver.backend = \"cpu\""));
+  return make_cpu_backend(CpuOptions{.threads = solver.threads});
 }
 
 std::vector<std::pair<std::string, std::string>> backend_states() {
   const auto cpu = make_cpu_backend({});
-  return {{"cpu", text("ready, ", cpu->threads(), cpu->threads() == 1 ? " thread" : " threads",
-                       ", double precision")},
+  const char* threads = cpu->threads() == 1 ? " thread" : " threads";
+  return {{"cpu", text("ready, ", cpu->threads(), threads, ", double and mixed precision")},
+          {"reference", text("ready, ", cpu->threads(), threads, ", double precision")},
           {"cuda", "not in this version"}};
 }
 

@@ -294,8 +294,9 @@ void read_solver(SceneTable& table, SolverSetup& solver) {
   table.read_choice(
       "precision", solver.precision,
       {{"double", Precision::double_}, {"mixed", Precision::mixed}, {"single", Precision::single}});
-  table.read_choice<std::string>("backend", solver.backend,
-                                 {{"cpu", "cpu"}, {"cuda", "cuda"}, {"auto", "auto"}});
+  table.read_choice<std::string>(
+      "backend", solver.backend,
+      {{"cpu", "cpu"}, {"reference", "reference"}, {"cuda", "cuda"}, {"auto", "auto"}});
   table.read("threads", solver.threads, 0);
   table.finish();
 }

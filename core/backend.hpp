@@ -15,7 +15,8 @@
 
 namespace kerf {
 
-/// Vectors that every level has. Level 0 has more: `Backend::add_vector`.
+/// Vectors that every level has; they may be of single precision. Level 0 has more, in double:
+/// `Backend::add_vector`. Forces, and what they are made from, live in these.
 enum VectorId : int {
   kSolution,   ///< u of A u = f
   kRight,      ///< f

@@ -101,7 +101,7 @@ struct SolverSetup {
   int max_levels = 0;            ///< 0: no limit
   bool duplicate_cells = true;   ///< false: merge by place only (for comparison)
   Precision precision = Precision::double_;
-  std::string backend = "cpu";  ///< cpu, cuda, auto
+  std::string backend = "cpu";  ///< cpu, reference, cuda, auto
   int threads = 0;              ///< 0: all
 };
 

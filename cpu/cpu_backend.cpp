@@ -40,7 +40,7 @@ class CpuBackend final : public Backend {
     expects(options.tile_log2 >= 0 && options.tile_log2 <= 6, "tile_log2 must lie in 0 .. 6");
   }
 
-  const char* name() const noexcept override { return "cpu"; }
+  const char* name() const noexcept override { return "reference"; }
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;

@@ -184,6 +184,9 @@ class FastBackend final : public Backend {
   template <class A, class B>
   double dot_typed(const A* a, const B* b, std::int32_t size) const;
   void chebyshev(int level);
+  void expects_exact(int in, int out) const {
+    ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
+  }
   bool is_exact(int level, int x) const { return levels_[level].vectors[x].is_exact(); }
   void changed(int level, int x) {
     if (x == kSolution) levels_[level].solution_is_zero = false;
@@ -412,7 +415,7 @@ void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool mas
 
 template <class S>
 void FastBackend<S>::apply(int level, int in, int out) {
-  expects(is_exact(level, in) == is_exact(level, out), "apply: both vectors of one precision");
+  ensures(is_exact(level, in) == is_exact(level, out), "apply mixes vectors of two precisions");
   changed(level, out);
   if (is_exact(level, in))
     apply_typed<double>(level, scale_, true, in, out);
@@ -422,11 +425,13 @@ void FastBackend<S>::apply(int level, int in, int out) {
 
 template <class S>
 void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
+  expects_exact(in, out);
   apply_typed<double>(0, scale, false, in, out);
 }
 
 template <class S>
 void FastBackend<S>::elastic_force(int displacement, int out) {
+  expects_exact(displacement, out);
   FastLevel<S>& l = levels_[0];
   const double* u = l.vectors[displacement].exact.data();
   double* all = records<double>(0);

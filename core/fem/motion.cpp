@@ -22,7 +22,8 @@ Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
       acceleration_(time.scheme == TimeScheme::newmark ? state.memory : backend.add_vector()),
       right_(backend.add_vector()),
       increment_(backend.add_vector()),
-      work_(backend.add_vector()) {}
+      work_(backend.add_vector()),
+      scratch_(backend.add_vector()) {}
 
 double Motion::velocity_factor() const {
   return time_.scheme == TimeScheme::newmark ? kGamma / (kBeta * time_.step) : 0.5 / time_.step;
@@ -50,10 +51,10 @@ void Motion::start() {
     const double next = backend_.dot(0, kSolution, right_);
     backend_.combine(0, 1, kSolution, i == 0 ? 0 : next / rho, work_);
     rho = next;
-    backend_.apply(0, work_, kScratch);
-    const double alpha = rho / backend_.dot(0, work_, kScratch);
+    backend_.apply(0, work_, scratch_);
+    const double alpha = rho / backend_.dot(0, work_, scratch_);
     backend_.add(0, alpha, work_, increment_);
-    backend_.add(0, -alpha, kScratch, right_);
+    backend_.add(0, -alpha, scratch_, right_);
   }
   if (time_.scheme == TimeScheme::newmark) {
     backend_.copy(0, increment_, acceleration_);
@@ -93,9 +94,9 @@ void Motion::residual(int out) {
   backend_.copy(0, state_.external, out);
   backend_.elastic_force(state_.displacement, work_);
   subtract(work_);
-  backend_.copy(0, acceleration_, kScratch);
-  backend_.add(0, material_.mass_damping, state_.velocity, kScratch);
-  backend_.apply_scaled({0, 1}, kScratch, work_);
+  backend_.copy(0, acceleration_, scratch_);
+  backend_.add(0, material_.mass_damping, state_.velocity, scratch_);
+  backend_.apply_scaled({0, 1}, scratch_, work_);
   subtract(work_);
   if (material_.stiffness_damping > 0) {
     backend_.apply_scaled({material_.stiffness_damping, 0}, state_.velocity, work_);

@@ -52,7 +52,7 @@ class Motion {
   Material material_;
   SolverSetup setup_;
   StateVectors state_;
-  int acceleration_, right_, increment_, work_;
+  int acceleration_, right_, increment_, work_, scratch_;
   double largest_force_ = 0;  // of the terms of the last residual
 };
 

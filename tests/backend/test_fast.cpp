@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+//
+// The fast backend with a single-precision cycle against the double reference: operation by
+// operation, whole solves, and runs with cuts. That its double twin is right is for
+// test_operators.cpp, against the oracle.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <string>
+
+#include "core/simulation.hpp"
+#include "core/solve/linear_solver.hpp"
+#include "tests/support/physics.hpp"
+#include "tests/support/problem.hpp"
+
+namespace kerf {
+namespace {
+
+using oracle::Vector;
+using test::Loaded;
+using test::Problem;
+using test::ProblemOptions;
+
+constexpr OperatorScale kDynamic{0.8, 400};
+// Some ten roundings of single precision, of sums whose terms are as large as the largest entry.
+constexpr double kSingle = 2e-6;
+// Diagonal blocks are inverted; those of lone corners are ill-conditioned by a factor of tens.
+constexpr double kSmoothed = 1e-4;
+
+double relative(const Vector& found, const Vector& expected) {
+  return (found - expected).lpNorm<Eigen::Infinity>() / expected.lpNorm<Eigen::Infinity>();
+}
+
+/// A cut octree of three materials, with held components and hanging corners.
+Problem cut_octree() {
+  LinkedOctree body(test::box_body({21, 14, 11}), 1);
+  test::cut_plane(body, {9.3, 5.2, 4.1}, {1, 0.2, 0.3}, 5);
+  ProblemOptions options;
+  options.coarsest_vertices = 60;
+  options.with_oracle = false;
+  return {std::move(body), options};
+}
+
+TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
+  const Problem p = cut_octree();
+  const Vector u = p.deformation();
+  const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, u);
+  const Loaded mixed(p, test::make_backend("mixed"), kDynamic, {}, u);
+  ASSERT_GE(p.levels(), 3);
+  for (int l = 0; l < p.levels(); ++l) {
+    SCOPED_TRACE(::testing::Message() << "level " << l);
+    const Vector x = p.free_vector(l, 7), f = p.free_vector(l, 8);
+    for (const Loaded* loaded : {&exact, &mixed}) {
+      test::write(*loaded->backend, l, kKrylovX, x);
+      loaded->backend->apply(l, kKrylovX, kKrylovV);
+    }
+    EXPECT_LE(relative(p.read(*mixed.backend, l, kKrylovV), p.read(*exact.backend, l, kKrylovV)),
+              kSingle);
+    if (l + 1 == p.levels()) continue;
+    for (const Loaded* loaded : {&exact, &mixed}) {
+      test::write(*loaded->backend, l, kRight, f);
+      loaded->backend->zero(l, kSolution);
+      loaded->backend->smooth(l, SweepOrder::forward, 2);
+      loaded->backend->residual(l);
+      loaded->backend->restrict_residual(l);
+    }
+    EXPECT_LE(relative(p.read(*mixed.backend, l, kSolution), p.read(*exact.backend, l, kSolution)),
+              kSmoothed);
+    EXPECT_LE(
+        relative(p.read(*mixed.backend, l + 1, kRight), p.read(*exact.backend, l + 1, kRight)),
+        kSmoothed);
+  }
+}
+
+TEST(MixedPrecision, ForcesAndRotationsStayDouble) {
+  constexpr double kDouble = 1e-12;
+  const Problem p = cut_octree();
+  const Vector u = p.deformation();
+  const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, u);
+  const Loaded mixed(p, test::make_backend("mixed"), kDynamic, {}, u);
+  Vector force[2], product[2];
+  std::vector<double> rotation[2];
+
+  for (int i = 0; i < 2; ++i) {
+    Backend& backend = *(i == 0 ? exact : mixed).backend;
+    const int in = exact.extra, out = exact.extra + 1;
+    backend.elastic_force(in, out);
+    force[i] = p.read(backend, 0, out);
+    backend.apply_scaled({-0.3, 170}, in, out);
+    product[i] = p.read(backend, 0, out);
+    rotation[i].resize(4 * p.hierarchy.values.size());
+    backend.read_rotations(rotation[i]);
+  }
+
+  EXPECT_LE(relative(force[1], force[0]), kDouble);
+  EXPECT_LE(relative(product[1], product[0]), kDouble);
+  for (std::size_t k = 0; k < rotation[0].size(); ++k)
+    ASSERT_NEAR(rotation[1][k], rotation[0][k], kDouble);
+}
+
+/// One solve by conjugate gradients with a K-cycle.
+struct Solved {
+  SolveStats stats;
+  Vector x;
+};
+Solved solve(const Problem& p, const std::string& machine, double tolerance, int threads = 1) {
+  SolverSetup setup;
+  setup.cycle = CycleType::k;
+  const auto backend = test::make_backend(machine, threads);
+  LinearSolver solver(*backend, setup);
+  const int b = backend->add_vector(), x = backend->add_vector();
+  backend->load(p.hierarchy);
+  solver.set_structure(p.hierarchy);
+  backend->set_operator(kDynamic);
+  test::write(*backend, 0, x, p.deformation());
+  backend->rotate_cells(x);
+  solver.refresh();
+  test::write(*backend, 0, b, p.free_vector(0, 101));
+  backend->zero(0, x);
+  const SolveStats stats = solver.solve(b, x, tolerance);
+  return {stats, p.read(*backend, 0, x)};
+}
+
+TEST(MixedPrecision, SolvesToATrueResidualThatSinglePrecisionNeverSees) {
+  const Problem p = cut_octree();
+  constexpr double kFar = 1e-11;
+
+  const Solved exact = solve(p, "cpu", kFar), mixed = solve(p, "mixed", kFar);
+
+  EXPECT_TRUE(mixed.stats.converged);
+  EXPECT_LE(mixed.stats.residual, kFar);
+  EXPECT_LE(std::abs(mixed.stats.cycles - exact.stats.cycles), 1);
+  EXPECT_LE(relative(mixed.x, exact.x), 1e-8);  // the residual times the condition of the body
+}
+
+TEST(FastBackend, GivesTheSameBitsForAnyNumberOfThreads) {
+  LinkedOctree body(test::box_body({33, 22, 15}), 1);
+  test::cut_plane(body, {14.3, 9.2, 7.1}, {1, 0.2, 0.3}, 8);
+  ProblemOptions options;
+  options.coarsest_vertices = 300;
+  options.with_oracle = false;
+  const Problem p(std::move(body), options);
+  for (const char* machine : {"fast", "mixed"}) {
+    const Solved one = solve(p, machine, 1e-6, 1);
+    for (const int threads : {2, 3, 4}) {
+      const Solved more = solve(p, machine, 1e-6, threads);
+      EXPECT_EQ(more.stats.residual, one.stats.residual) << machine;
+      EXPECT_EQ(std::memcmp(more.x.data(), one.x.data(), sizeof(double) * p.unknowns(0)), 0)
+          << machine << ", " << threads << " threads";
+    }
+  }
+}
+
+/// A block that sags and is cut on its way, in either mode.
+SimulationSetup block(TimeMode mode) {
+  SimulationSetup setup;
+  setup.body = {test::box_solid({1, 1, 0.5}), 10, 1};
+  setup.material = {1e5, 0.4, 1000, 0, 0.01};  // stiff enough to have one equilibrium
+  setup.supports = {{{{-9, -9, -9}, {9, 0.001, 9}}, {}, {true, true, true}}};
+  setup.loads = {Gravity{{3, -9.81, 0}}};
+  setup.time.mode = mode;
+  setup.time.duration = 0.2;
+  setup.solver.tolerance = 1e-9;
+  CutSetup cut;
+  cut.start = 0.04;
+  if (mode == TimeMode::dynamic) cut.end = 0.15;
+  cut.lines = {{{0.53, 1.5, -1}, {0.57, 1.6, 2}}, {{0.48, 0.4, -1}, {0.52, 0.5, 2}}};
+  setup.cuts = {cut};
+  return setup;
+}
+
+std::vector<Vec3d> corners_after(const SimulationSetup& setup, std::unique_ptr<Backend> backend) {
+  Simulation simulation(setup, std::move(backend));
+  while (!simulation.finished()) EXPECT_TRUE(simulation.step().converged);
+  return simulation.deformed_corners();
+}
+
+TEST(FastBackend, RunsWithCutsEndWhereTheReferenceEnds) {
+  constexpr double kOfTheSolver = 1e-6;  // m of a block of 1 m: the tolerance times the steps
+  for (const TimeMode mode : {TimeMode::dynamic, TimeMode::statics}) {
+    const SimulationSetup setup = block(mode);
+    const auto expected = corners_after(setup, test::make_backend("cpu"));
+    for (const char* machine : {"fast", "mixed"}) {
+      const auto found = corners_after(setup, test::make_backend(machine, 2));
+      ASSERT_EQ(found.size(), expected.size());
+      double worst = 0;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        worst = std::max(worst, norm(found[i] - expected[i]));
+      EXPECT_LE(worst, kOfTheSolver)
+          << machine << (mode == TimeMode::dynamic ? ", dynamic" : ", static");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kerf
