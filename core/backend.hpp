@@ -11,6 +11,7 @@
 #include <span>
 
 #include "core/levels/hierarchy.hpp"
+#include "core/surface/surface_view.hpp"
 
 namespace kerf {
 
@@ -89,6 +90,15 @@ class Backend {
   virtual void elastic_force(int displacement, int out) = 0;
   /// out = (scale.stiffness [R] K [R]^T + scale.mass M) in; held components too.
   virtual void apply_scaled(const OperatorScale& scale, int in, int out) = 0;
+
+  // A surface bound to the cells of level 0.
+  /// Positions of points that move with their cells, m: reference + u. Free slots keep theirs.
+  virtual void move_points(std::span<const BoundPoint> points, int displacement,
+                           std::span<Vec3d> positions) = 0;
+  /// Unit normals: for each list of corners that share one, the sum of the faces by area, in the
+  /// order of the list.
+  virtual void surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
+                               std::span<Vec3d> normals) = 0;
 
   // Vectors.
   virtual void zero(int level, int x) = 0;

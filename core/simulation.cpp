@@ -17,6 +17,7 @@
 #include "core/fem/motion.hpp"
 #include "core/levels/corners.hpp"
 #include "core/snapshot.hpp"
+#include "core/surface/surface.hpp"
 #include "kernels/mat3.hpp"
 
 namespace kerf {
@@ -25,6 +26,7 @@ namespace {
 // Seconds of the phases that are not the linear solver's.
 struct Clock {
   double voxelise = 0, cut = 0, structure = 0, load = 0, step = 0;
+  double surface = 0, surface_bind = 0, surface_positions = 0, surface_normals = 0;
 };
 
 std::vector<std::shared_ptr<const Solid>> solids_of(const std::vector<Region>& regions) {
@@ -59,6 +61,8 @@ struct Simulation::Impl {
   void build_structure();
   void warn_of_idle_supports();
   void load_structure();
+  void bind_surface();
+  void move_surface();
   void check_memory() const;
   bool apply_cut(const DueCut& due, StepReport& report);
   void transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
@@ -69,6 +73,7 @@ struct Simulation::Impl {
   void step_back();
   void warn_of_pieces();
   std::vector<double> read_vector(int x) const;
+  NonlinearStats solve_step();
   StepReport step();
 
   SimulationSetup setup;
@@ -84,6 +89,8 @@ struct Simulation::Impl {
   std::unique_ptr<Equilibrium> equilibrium;
   std::vector<double> held;  // displacement of held components
   FrozenCrumbs crumbs;
+  std::unique_ptr<Surface> surface;       // null: none asked for
+  std::vector<Vec3d> positions, normals;  // of its slots, after the last step
   std::vector<std::int32_t> piece;
   std::size_t pieces = 0, cells_before = 0, hanging = 0, links_cut = 0;
   int steps = 0;
@@ -112,6 +119,11 @@ void Simulation::Impl::start() {
     equilibrium = std::make_unique<Equilibrium>(*backend, solver, setup.time, setup.solver, state);
   }
   build_structure();
+  if (setup.surface != SurfaceMethod::none) {
+    const AddTime timer(clock.surface);
+    surface = std::make_unique<Surface>(body, setup.surface);
+  }
+  bind_surface();
   cells_before = hierarchy.values.size();
   warn_of_idle_supports();
   warn_of_pieces();
@@ -122,6 +134,7 @@ void Simulation::Impl::start() {
     const AddTime timer(clock.step);
     motion->start();
   }
+  move_surface();
   if (equilibrium)
     equilibrium->on_progress([this](int update, double residual) {
       if (progress) progress("equilibrium", update, residual);
@@ -186,6 +199,26 @@ void Simulation::Impl::load_structure() {
   solver.set_structure(hierarchy);
 }
 
+void Simulation::Impl::bind_surface() {
+  if (!surface) return;
+  const AddTime timer(clock.surface_bind);
+  surface->bind(body);
+}
+
+// The surface follows the body: every step, since its user may draw every step.
+void Simulation::Impl::move_surface() {
+  if (!surface) return;
+  const SurfaceView view = surface->view();
+  {
+    const AddTime timer(clock.surface_positions);
+    positions.resize(view.points.size());
+    backend->move_points(view.points, state.displacement, positions);
+  }
+  const AddTime timer(clock.surface_normals);
+  normals.resize(view.normals);
+  backend->surface_normals(view, positions, normals);
+}
+
 // Before levels, matrices and vectors are allocated: all that exists are the leaves. Measured on
 // uniform and refined bodies: 1900 to 2700 bytes a cell at 10^5 cells and more.
 void Simulation::Impl::check_memory() const {
@@ -237,7 +270,14 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   }
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
-  if (!event.changed()) return false;
+  if (surface) {
+    const AddTime timer(clock.surface);
+    surface->update(body, event);
+  }
+  if (!event.changed()) {
+    if (!event.moved.empty()) bind_surface();
+    return false;
+  }
 
   std::vector<double> rotations(4 * hierarchy.values.size());
   backend->read_rotations(rotations);
@@ -246,6 +286,7 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   const Level before = std::move(hierarchy.levels[0]);
   build_structure();
   load_structure();
+  bind_surface();
   transfer(before, leaves_before, std::move(values), rotations);
   return true;
 }
@@ -309,6 +350,11 @@ void Simulation::Impl::warn_of_pieces() {
                           " of them held by no support; a finer body.resolution joins thin parts"));
 }
 
+NonlinearStats Simulation::Impl::solve_step() {
+  const AddTime timer(clock.step);
+  return motion ? motion->step() : equilibrium->solve(natural_time(), prescribed);
+}
+
 StepReport Simulation::Impl::step() {
   const Timer timer;
   StepReport report;
@@ -316,10 +362,8 @@ StepReport Simulation::Impl::step() {
   for (const DueCut& due : schedule.due(steps)) apply_cut(due, report);
   report.pieces = pieces;
 
-  const AddTime phase(clock.step);
   if (motion) copy_state(state, before_step);
-  const NonlinearStats stats =
-      motion ? motion->step() : equilibrium->solve(natural_time(), prescribed);
+  const NonlinearStats stats = solve_step();
   prescribed = false;
   ++steps;
   time = motion ? steps * setup.time.step : steps;
@@ -332,12 +376,13 @@ StepReport Simulation::Impl::step() {
   report.converged = stats.converged;
   report.cells = hierarchy.values.size();
   report.vertices = hierarchy.levels[0].point.size();
-  report.seconds = timer.seconds();
   if (motion && !std::isfinite(stats.residual)) {
     step_back();
     report.residual = std::numeric_limits<double>::max();
     report.converged = false;
   }
+  move_surface();
+  report.seconds = timer.seconds();
   return report;
 }
 
@@ -385,7 +430,8 @@ std::size_t Simulation::unknowns() const {
 
 std::size_t Simulation::bytes() const {
   return impl_->body.bytes() + impl_->hierarchy.bytes() + impl_->backend->bytes() +
-         impl_->solver.bytes();
+         impl_->solver.bytes() + (impl_->surface ? impl_->surface->bytes() : 0) +
+         (impl_->positions.capacity() + impl_->normals.capacity()) * sizeof(Vec3d);
 }
 
 PhaseTimes Simulation::seconds() const {
@@ -397,7 +443,11 @@ PhaseTimes Simulation::seconds() const {
           {"load", clock.load},
           {"values", solver.values},
           {"solve", solver.solve},
-          {"forces", clock.step - solver.values - solver.solve}};
+          {"forces", clock.step - solver.values - solver.solve},
+          {"surface", clock.surface},
+          {"surface_bind", clock.surface_bind},
+          {"surface_positions", clock.surface_positions},
+          {"surface_normals", clock.surface_normals}};
 }
 
 Snapshot Simulation::snapshot() const {
@@ -422,7 +472,10 @@ Snapshot Simulation::snapshot() const {
   return out;
 }
 
-SurfaceMesh Simulation::surface_mesh() const { return {}; }
+SurfaceMesh Simulation::surface_mesh() const {
+  if (!impl_->surface) return {};
+  return impl_->surface->mesh(impl_->positions, impl_->normals, impl_->piece);
+}
 
 std::uint64_t Simulation::state_hash() const {
   // FNV-1a over the bits, in vertex order.

@@ -19,6 +19,7 @@
 #include "kernels/coarsen.hpp"
 #include "kernels/relax.hpp"
 #include "kernels/rotation.hpp"
+#include "kernels/surface.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
@@ -67,6 +68,11 @@ class CpuBackend final : public Backend {
   void elastic_force(int displacement, int out) override;
   void apply_scaled(const OperatorScale& scale, int in, int out) override;
 
+  void move_points(std::span<const BoundPoint> points, int displacement,
+                   std::span<Vec3d> positions) override;
+  void surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
+                       std::span<Vec3d> normals) override;
+
   void zero(int level, int x) override;
   void copy(int level, int from, int to) override;
   void add(int level, double a, int x, int y) override { combine(level, a, x, 1, y); }
@@ -106,12 +112,14 @@ class CpuBackend final : public Backend {
   FinestStore finest_;
   std::vector<LevelStore> levels_;
   int vectors_on_finest_ = kLevelVectors;
+  std::vector<Vec> faces_;  // of the surface: area normals
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
 };
 
 std::size_t CpuBackend::bytes() const {
-  std::size_t sum = finest_.rotation.capacity() * sizeof(Quaternion);
+  std::size_t sum =
+      finest_.rotation.capacity() * sizeof(Quaternion) + faces_.capacity() * sizeof(Vec);
   for (const LevelStore& store : levels_) sum += store.bytes();
   if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.factor_entries() * 12;
   return sum;
@@ -307,6 +315,48 @@ void CpuBackend::elastic_force(int displacement, int out) {
                            finest_.materials[values.material].modes.stiffness, corners);
     kernels::fold_transpose(corners, store.level->fold[cell], f);
   });
+}
+
+void CpuBackend::move_points(std::span<const BoundPoint> points, int displacement,
+                             std::span<Vec3d> positions) {
+  const Level& level = *levels_[0].level;
+  const double* u = data(0, displacement);
+  parallel(
+      static_cast<std::int32_t>(points.size()),
+      [&](std::int32_t p) {
+        const BoundPoint& point = points[p];
+        positions[p] = point.reference;
+        if (point.cell < 0) return;
+        Vec at[8], corners[8];
+        for (int i = 0; i < 8; ++i) at[i] = cpu::load(u, level.slots[point.cell][i]);
+        kernels::unfold(at, level.fold[point.cell], corners);
+        positions[p] += kernels::trilinear(corners, point.local);
+      },
+      kWorthVertices);
+}
+
+void CpuBackend::surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
+                                 std::span<Vec3d> normals) {
+  faces_.resize(surface.triangles.size());
+  parallel(
+      static_cast<std::int32_t>(surface.triangles.size()),
+      [&](std::int32_t t) {
+        const auto& [a, b, c] = surface.triangles[t];
+        faces_[t] = kernels::area_normal(positions[a], positions[b], positions[c]);
+      },
+      kWorthVertices);
+  parallel(
+      static_cast<std::int32_t>(surface.points.size()),
+      [&](std::int32_t p) {
+        for (std::int32_t c = surface.first_corner[p]; c >= 0;) {
+          const std::int32_t normal = surface.normal_of[c];
+          Vec sum{};
+          for (; c >= 0 && surface.normal_of[c] == normal; c = surface.next_corner[c])
+            sum += faces_[c / 3];
+          normals[normal] = kernels::unit_or_z(sum);
+        }
+      },
+      kWorthVertices);
 }
 
 double CpuBackend::residual(int level) {

@@ -272,6 +272,12 @@ LinkCut nearest(std::span<const Hit> hits, double spacing, std::int32_t cut_id) 
   return cut;
 }
 
+/// Whether `cut` passes nearer to an end of its link than what is recorded.
+bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
+  return cut.end[0].distance < recorded.end[0].distance ||
+         cut.end[1].distance < recorded.end[1].distance;
+}
+
 }  // namespace
 
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
@@ -306,8 +312,11 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
     while (end < hits.size() && hits[end].key == key) ++end;
     const LinkCut record = nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id);
     ++event.links_hit;
-    if (body.disconnect(lattice.link_lower(key), Lattice::link_axis(key), record))
-      event.disconnected.push_back(key);
+    const Vec3i lower = lattice.link_lower(key);
+    const int axis = Lattice::link_axis(key);
+    const LinkCut* before = body.record(lower, axis);
+    if (before != nullptr && comes_nearer(record, *before)) event.moved.push_back(key);
+    if (body.disconnect(lower, axis, record)) event.disconnected.push_back(key);
   }
   event.cells_after = body.leaf_count();
   return event;

@@ -17,10 +17,13 @@ namespace kerf {
 /// What one blade pass did.
 struct CutEvent {
   std::int32_t cut_id = 0;
-  std::size_t links_hit = 0;            ///< finest links between two inside cells the blade crosses
-  std::vector<LinkKey> disconnected;    ///< those of them that were connected before, ascending
-  std::size_t cells_before = 0;         ///< leaves before and after
+  std::size_t links_hit = 0;          ///< finest links between two inside cells the blade crosses
+  std::vector<LinkKey> disconnected;  ///< those of them that were connected before, ascending
+  std::vector<LinkKey> moved;         ///< those that were cut before, where it passed nearer to an
+                                      ///< end than all cuts so far, ascending
+  std::size_t cells_before = 0;       ///< leaves before and after
   std::size_t cells_after = 0;
+  /// Whether the structure of cells and vertices changed; the surface may have moved all the same.
   bool changed() const { return !disconnected.empty() || cells_before != cells_after; }
 };
 

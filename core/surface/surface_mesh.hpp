@@ -17,9 +17,9 @@ namespace kerf {
 /// Points are shared by all triangles around them; normals are not: a point has one normal for each
 /// cut id around it, and two at the tip of a cut. So cuts are smooth and their edges sharp.
 struct SurfaceMesh {
-  std::vector<Vec3d> reference;      ///< per point: position at rest, m
-  std::vector<Vec3d> displacement;   ///< per point, m
-  std::vector<std::int32_t> piece;   ///< per point: the connected part that it moves with
+  std::vector<Vec3d> reference;     ///< per point: position at rest, m
+  std::vector<Vec3d> displacement;  ///< per point, m
+  std::vector<std::int32_t> piece;  ///< per point: the connected part that it moves with
   std::vector<std::array<std::int32_t, 3>> triangles;  ///< points, counter-clockwise from outside
   std::vector<std::array<std::int32_t, 3>> normal_of;  ///< per corner of a triangle, into normals
   std::vector<std::int32_t> cut_id;  ///< per triangle; 0: the object's own surface, 1, 2, ...: cuts

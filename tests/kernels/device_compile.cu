@@ -13,6 +13,7 @@
 #include "kernels/relax.hpp"
 #include "kernels/residual.hpp"
 #include "kernels/rotation.hpp"
+#include "kernels/surface.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf::kernels {
@@ -48,6 +49,7 @@ __global__ void touch_all(const Vec3<T>* displacement, Quat<T>* rotation, T* mat
   force[cell] = relax_vertex(corners[0], row, packed_block<T>(matrix, 0, 0), T(1));
   force[cell] = relax_vertex(force[cell], row,
                              inverse_semidefinite(cell_diagonal(K, M, R, side, side, 0)), T(1));
+  force[cell] += unit_or_z(area_normal(trilinear(corners, f[0]), f[1], f[2]));
 }
 
 template __global__ void touch_all<float>(const Vec3<float>*, Quat<float>*, float*, float*,

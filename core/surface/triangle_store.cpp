@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "core/surface/triangle_store.hpp"
+
+#include <limits>
+
+#include "core/base/error.hpp"
+
+namespace kerf {
+namespace {
+
+/// An index that was freed, or the next one at the end of an array that holds `size`.
+std::int32_t take(std::vector<std::int32_t>& free, std::size_t size) {
+  if (!free.empty()) {
+    const std::int32_t i = free.back();
+    free.pop_back();
+    return i;
+  }
+  if (size >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()) / 3)
+    throw Error(ErrorKind::unavailable,
+                "the surface has more than 7e8 triangles: lower the resolution");
+  return static_cast<std::int32_t>(size);
+}
+
+}  // namespace
+
+std::int32_t TriangleStore::add_vertex(std::uint64_t key, const Vertex& vertex) {
+  const std::int32_t v = take(free_vertices_, reference.size());
+  if (static_cast<std::size_t>(v) == reference.size()) {
+    reference.emplace_back();
+    finest_cell.emplace_back();
+    vertex_key.push_back(0);
+    first_corner.push_back(-1);
+    used.push_back(0);
+    first_normal_.push_back(-1);
+    is_changed_.push_back(0);
+  }
+  used[v] = 1;
+  vertex_key[v] = key;
+  set_vertex(v, vertex);
+  return v;
+}
+
+void TriangleStore::set_vertex(std::int32_t v, const Vertex& vertex) {
+  reference[v] = vertex.reference;
+  finest_cell[v] = vertex.cell;
+}
+
+void TriangleStore::remove_vertex(std::int32_t v) {
+  ensures(used[v] != 0 && first_corner[v] < 0, "a vertex is removed under its triangles");
+  used[v] = 0;
+  mark(v);  // its normals are to be freed
+  free_vertices_.push_back(v);
+}
+
+bool TriangleStore::comes_before(std::int32_t a, std::int32_t b) const {
+  const std::int32_t s = a / 3, t = b / 3;
+  return group[s] != group[t] ? group[s] < group[t] : order[s] < order[t];
+}
+
+void TriangleStore::mark(std::int32_t v) {
+  if (is_changed_[v] != 0) return;
+  is_changed_[v] = 1;
+  changed_.push_back(v);
+}
+
+std::int32_t TriangleStore::add_triangle(const std::array<std::int32_t, 3>& vertices,
+                                         std::int32_t group_of_all, std::uint64_t place) {
+  const std::int32_t t = take(free_triangles_, triangles.size());
+  if (static_cast<std::size_t>(t) == triangles.size()) {
+    triangles.emplace_back();
+    group.push_back(0);
+    order.push_back(0);
+    next_corner.resize(next_corner.size() + 3, -1);
+    normal_of.resize(normal_of.size() + 3, -1);
+  }
+  triangles[t] = vertices;
+  group[t] = group_of_all;
+  order[t] = place;
+  for (int k = 0; k < 3; ++k) {
+    const std::int32_t corner = 3 * t + k, v = vertices[static_cast<std::size_t>(k)];
+    std::int32_t* at = &first_corner[v];
+    while (*at >= 0 && comes_before(*at, corner)) at = &next_corner[*at];
+    next_corner[corner] = *at;
+    *at = corner;
+    mark(v);
+  }
+  return t;
+}
+
+void TriangleStore::remove_triangle(std::int32_t t) {
+  for (int k = 0; k < 3; ++k) {
+    const std::int32_t corner = 3 * t + k, v = triangles[t][static_cast<std::size_t>(k)];
+    std::int32_t* at = &first_corner[v];
+    while (*at != corner) at = &next_corner[*at];
+    *at = next_corner[corner];
+    mark(v);
+  }
+  triangles[t] = {0, 0, 0};
+  free_triangles_.push_back(t);
+}
+
+void TriangleStore::finish() {
+  for (const std::int32_t v : changed_) {
+    while (first_normal_[v] >= 0) {
+      free_normals_.push_back(first_normal_[v]);
+      first_normal_[v] = next_normal_[first_normal_[v]];
+    }
+  }
+  for (const std::int32_t v : changed_) {
+    is_changed_[v] = 0;
+    std::int32_t last_group = -1, normal = -1;
+    for (std::int32_t c = first_corner[v]; c >= 0; c = next_corner[c]) {
+      if (group[c / 3] != last_group) {
+        last_group = group[c / 3];
+        normal = take(free_normals_, normals_);
+        if (static_cast<std::size_t>(normal) == normals_) {
+          ++normals_;
+          next_normal_.push_back(-1);
+        }
+        next_normal_[normal] = first_normal_[v];
+        first_normal_[v] = normal;
+      }
+      normal_of[c] = normal;
+    }
+  }
+  changed_.clear();
+}
+
+std::size_t TriangleStore::bytes() const {
+  const auto of = [](const auto& array) { return array.capacity() * sizeof(array[0]); };
+  return of(reference) + of(finest_cell) + of(vertex_key) + of(first_corner) + of(triangles) +
+         of(group) + of(order) + of(next_corner) + of(normal_of) + of(used) + of(first_normal_) +
+         of(next_normal_) + of(free_vertices_) + of(free_triangles_) + of(free_normals_) +
+         of(changed_) + of(is_changed_);
+}
+
+}  // namespace kerf

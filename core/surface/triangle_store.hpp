@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+//
+// A surface that changes in parts: vertices, triangles and normals in slots that are freed and used
+// again, so that a change costs what it touches.
+//
+// Layout  structure of arrays, 32-bit indices, -1 for none.
+//         Corner 3 t + k is corner k of triangle t. The corners at one vertex form a list,
+//         ascending by (smoothing group, order); each group in it shares one normal:
+//
+//           first_corner[v] -> 3 t + k -> next_corner[3 t + k] -> ... -> -1
+//           normal_of[3 t + k]: the normal of that corner
+//
+//         A free slot: a vertex without corners; a triangle of three indices 0. So the arrays may
+//         be drawn as they are.
+//         Sums over a list run in its order, which depends on the surface alone, not on its past.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/vec.hpp"
+
+namespace kerf {
+
+class TriangleStore {
+ public:
+  /// Where a vertex is at rest, and the finest cell that it moves with.
+  struct Vertex {
+    Vec3d reference{};  ///< m
+    Vec3i cell{};       ///< on the finest lattice; holds material
+  };
+
+  /// `key` names the vertex among all of a surface, for ever.
+  std::int32_t add_vertex(std::uint64_t key, const Vertex& vertex);
+  void set_vertex(std::int32_t v, const Vertex& vertex);
+  /// Needs  v has no triangles.
+  void remove_vertex(std::int32_t v);
+
+  /// `group` tells which triangles around a vertex share a normal: 2 cut_id + facing.
+  /// `order` names the triangle among all of a surface, for ever.
+  std::int32_t add_triangle(const std::array<std::int32_t, 3>& vertices, std::int32_t group,
+                            std::uint64_t order);
+  void remove_triangle(std::int32_t t);
+
+  /// Hands out normals to the vertices whose triangles changed since the last call.
+  void finish();
+
+  std::size_t vertex_slots() const { return reference.size(); }
+  std::size_t triangle_slots() const { return triangles.size(); }
+  std::size_t normal_slots() const { return normals_; }
+  std::size_t vertices_used() const { return reference.size() - free_vertices_.size(); }
+  std::size_t triangles_used() const { return triangles.size() - free_triangles_.size(); }
+  std::size_t bytes() const;
+
+  // Per vertex.
+  std::vector<Vec3d> reference;  ///< m
+  std::vector<Vec3i> finest_cell;
+  std::vector<std::uint64_t> vertex_key;
+  std::vector<std::int32_t> first_corner;
+  std::vector<std::uint8_t> used;  ///< 0: the slot is free
+  // Per triangle.
+  std::vector<std::array<std::int32_t, 3>> triangles;
+  std::vector<std::int32_t> group;
+  std::vector<std::uint64_t> order;
+  // Per corner of a triangle.
+  std::vector<std::int32_t> next_corner;
+  std::vector<std::int32_t> normal_of;
+
+ private:
+  bool comes_before(std::int32_t a, std::int32_t b) const;
+  void mark(std::int32_t v);
+
+  std::vector<std::int32_t> first_normal_;  // per vertex; a list through next_normal_
+  std::vector<std::int32_t> next_normal_;   // per normal
+  std::size_t normals_ = 0;
+  std::vector<std::int32_t> free_vertices_, free_triangles_, free_normals_;
+  std::vector<std::int32_t> changed_;
+  std::vector<std::uint8_t> is_changed_;
+};
+
+}  // namespace kerf
