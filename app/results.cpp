@@ -8,8 +8,13 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
+#include "app/figures.hpp"
+#include "app/glb.hpp"
+#include "app/ply.hpp"
 #include "app/version.hpp"
+#include "app/vtp.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf {
@@ -23,16 +28,38 @@ constexpr const char* kPartial = ".partial";
 
 std::string partial_name(const std::string& name) { return "." + name + kPartial; }
 
-/// body_NNNN.vtu with four digits or more.
-bool is_body_file(const std::string& name) {
-  if (!name.starts_with("body_") || !name.ends_with(".vtu")) return false;
-  const std::string digits = name.substr(5, name.size() - 9);
-  return digits.size() >= 4 &&
-         std::all_of(digits.begin(), digits.end(), [](char c) { return c >= '0' && c <= '9'; });
+bool all_digits(std::string_view s) {
+  return !s.empty() && std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+/// STEM NNNN EXTENSION with four digits or more.
+bool is_numbered(std::string_view name, std::string_view stem, std::string_view extension) {
+  if (name.size() < stem.size() + 4 + extension.size()) return false;
+  if (!name.starts_with(stem) || !name.ends_with(extension)) return false;
+  return all_digits(name.substr(stem.size(), name.size() - stem.size() - extension.size()));
+}
+
+/// level_K_NNNN.vtu
+bool is_level_file(const std::string& name) {
+  constexpr std::string_view kStem = "level_";
+  const std::size_t end = name.find('_', kStem.size());
+  return end != std::string::npos && name.starts_with(kStem) &&
+         all_digits(std::string_view(name).substr(kStem.size(), end - kStem.size())) &&
+         is_numbered(name, name.substr(0, end + 1), ".vtu");
+}
+
+/// Whether a run, or `kerf render` after it, gives a file this name.
 bool is_ours(const std::string& name) {
-  return is_body_file(name) || name == "body.pvd" || name == "preview.png" || name == kSummary;
+  for (const char* whole : {"body.pvd", "surface.pvd", "preview.png", kSummary})
+    if (name == whole) return true;
+  for (const auto& [stem, extension] : {std::pair{"body_", ".vtu"},
+                                        {"surface_", ".vtp"},
+                                        {"surface_", ".ply"},
+                                        {"surface_", ".glb"},
+                                        {"links_", ".vtp"},
+                                        {"frame_", ".png"}})
+    if (is_numbered(name, stem, extension)) return true;
+  return is_level_file(name);
 }
 
 /// A temporary file of a run that was killed.
@@ -43,6 +70,18 @@ bool is_our_partial(const std::string& name) {
 
 Error cannot_write(const fs::path& path, const std::string& why) {
   return Error(ErrorKind::bad_input, text(path.string(), ": cannot be written: ", why));
+}
+
+const char* surface_name(SurfaceMethod method) {
+  switch (method) {
+    case SurfaceMethod::dual_contouring:
+      return "dual-contouring";
+    case SurfaceMethod::splitting_cubes:
+      return "splitting-cubes";
+    case SurfaceMethod::none:
+      break;
+  }
+  return "none";
 }
 
 Json step_json(const StepReport& step) {
@@ -84,6 +123,9 @@ std::string to_json(const Summary& s) {
   json["level_vertices"] = s.level_vertices;
   json["pieces"] = s.pieces;
   json["links_cut"] = s.links_cut;
+  json["surface"] = {{"method", surface_name(s.surface)},
+                     {"points", s.surface_points},
+                     {"triangles", s.surface_triangles}};
   json["converged"] = s.converged;
   json["interrupted"] = s.interrupted;
   json["seconds"] = Json::object();
@@ -163,7 +205,43 @@ void ResultsFolder::add_snapshot(int step, double time, const Snapshot& snapshot
   const std::string name = fmt::format("body_{:04}.vtu", step);
   const fs::path path = add_file(name);
   write_vtu(path, snapshot);
-  series_.emplace_back(time, name);
+  bodies_.emplace_back(time, name);
+}
+
+std::string ResultsFolder::add_surface(int step, double time, const SurfaceMesh& surface) {
+  const std::string stem = fmt::format("surface_{:04}", step);
+  if (settings_.vtp) {
+    write_vtp(add_file(stem + ".vtp"), surface);
+    surfaces_.emplace_back(time, stem + ".vtp");
+  }
+  if (settings_.ply) write_ply(add_file(stem + ".ply"), surface);
+  if (!settings_.glb) return {};
+  const std::string obstacle = glb_obstacle(surface);
+  if (!obstacle.empty()) return "no " + stem + ".glb: " + obstacle;
+  write_glb(add_file(stem + ".glb"), surface);
+  return {};
+}
+
+void ResultsFolder::add_figures(int step, const LinkedOctree& body, const Hierarchy& hierarchy,
+                                std::span<const Vec3d> corners) {
+  if (settings_.levels)
+    for (std::size_t level = 0; level < hierarchy.levels.size(); ++level)
+      write_level(add_file(fmt::format("level_{}_{:04}.vtu", level, step)),
+                  level_figure(body, hierarchy, level, corners));
+  if (settings_.links)
+    write_links(add_file(fmt::format("links_{:04}.vtp", step)), links_figure(body));
+}
+
+void ResultsFolder::write_series(const std::string& name, const Series& series) {
+  std::string pvd =
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
+      "  <Collection>\n";
+  for (const auto& [time, file] : series)
+    pvd += fmt::format("    <DataSet timestep=\"{:.9g}\" part=\"0\" file=\"{}\"/>\n", time, file);
+  pvd += "  </Collection>\n</VTKFile>\n";
+  add_file(name);
+  write_text(name, pvd);
 }
 
 // Files of an earlier run that this one did not write again. Where no summary was, none was ours.
@@ -181,17 +259,8 @@ void ResultsFolder::remove_stale(bool earlier_run) const {
 }
 
 void ResultsFolder::commit(const Summary& summary) {
-  if (settings_.pvd) {
-    std::string pvd =
-        "<?xml version=\"1.0\"?>\n"
-        "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
-        "  <Collection>\n";
-    for (const auto& [time, name] : series_)
-      pvd += fmt::format("    <DataSet timestep=\"{:.9g}\" part=\"0\" file=\"{}\"/>\n", time, name);
-    pvd += "  </Collection>\n</VTKFile>\n";
-    add_file("body.pvd");
-    write_text("body.pvd", pvd);
-  }
+  if (settings_.pvd && settings_.vtu) write_series("body.pvd", bodies_);
+  if (settings_.pvd && settings_.vtp) write_series("surface.pvd", surfaces_);
   write_text(kSummary, to_json(summary));
 
   // Nothing may stand in the way of a file once the renaming has begun.

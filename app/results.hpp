@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,7 +20,9 @@ struct Summary {
   std::string scene, title;
   std::size_t cells = 0, cells_before_cuts = 0, vertices = 0, unknowns = 0, hanging = 0;
   std::size_t pieces = 0, links_cut = 0;
-  std::vector<std::size_t> level_cells, level_vertices;  ///< finest first
+  SurfaceMethod surface = SurfaceMethod::none;
+  std::size_t surface_points = 0, surface_triangles = 0;  ///< at the end
+  std::vector<std::size_t> level_cells, level_vertices;   ///< finest first
   PhaseTimes seconds;
   double seconds_total = 0;
   std::vector<StepReport> steps;
@@ -52,6 +55,11 @@ class ResultsFolder {
   ResultsFolder& operator=(const ResultsFolder&) = delete;
 
   void add_snapshot(int step, double time, const Snapshot& snapshot);
+  /// The files of the surface that are asked for. Returns why one of them was left out, if so.
+  std::string add_surface(int step, double time, const SurfaceMesh& surface);
+  /// Levels and links, where asked for. `corners` are those of Simulation::deformed_corners().
+  void add_figures(int step, const LinkedOctree& body, const Hierarchy& hierarchy,
+                   std::span<const Vec3d> corners);
   /// A temporary path for one more file; it must exist when `commit` is called.
   std::filesystem::path add_file(const std::string& name);
   void drop_file(const std::string& name);  ///< takes it back, written or not
@@ -60,15 +68,19 @@ class ResultsFolder {
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
+  /// Times and the files that show them.
+  using Series = std::vector<std::pair<double, std::string>>;
+
   void write_text(const std::string& name, const std::string& content);
+  void write_series(const std::string& name, const Series& series);
   void remove_stale(bool earlier_run) const;
 
   std::filesystem::path folder_;
   OutputSettings settings_;
   bool committed_ = false;
-  std::vector<std::filesystem::path> created_;          // folders that were not there before
-  std::vector<std::string> files_;                      // names, written as partial so far
-  std::vector<std::pair<double, std::string>> series_;  // time and body file
+  std::vector<std::filesystem::path> created_;  // folders that were not there before
+  std::vector<std::string> files_;              // names, written as partial so far
+  Series bodies_, surfaces_;
 };
 
 }  // namespace kerf

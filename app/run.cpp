@@ -54,9 +54,9 @@ class Run {
     const InterruptGuard guard;
     say_body();
     say_warnings();
-    results_.add_snapshot(0, simulation_.time(), simulation_.snapshot());
+    write_state();
     step_through();
-    if (last_written_ != simulation_steps() || snapshot_.cells.empty()) write_snapshot();
+    if (last_written_ != simulation_steps()) write_state();
     draw();
     finish_summary();
     results_.commit(summary_);
@@ -104,7 +104,7 @@ class Run {
       summary_.steps.push_back(step);
       note(step);
       bar_.finished(step);
-      if (step.step % scene_.output.every == 0) write_snapshot();
+      if (step.step % scene_.output.every == 0) write_state();
     }
     summary_.interrupted = InterruptGuard::asked() && !simulation_.finished();
     simulation_.on_progress({});
@@ -125,10 +125,25 @@ class Run {
     say_warnings();
   }
 
-  void write_snapshot() {
+  void write_state() {
+    const int step = simulation_steps();
+    const double time = simulation_.time();
     snapshot_ = simulation_.snapshot();
-    last_written_ = simulation_steps();
-    if (last_written_ > 0) results_.add_snapshot(last_written_, simulation_.time(), snapshot_);
+    surface_ = simulation_.surface_mesh();
+    results_.add_snapshot(step, time, snapshot_);
+    if (scene_.setup.surface != SurfaceMethod::none) {
+      const std::string left_out = results_.add_surface(step, time, surface_);
+      if (!left_out.empty()) warn(left_out);
+    }
+    if (scene_.output.levels || scene_.output.links)
+      results_.add_figures(step, simulation_.body(), simulation_.hierarchy(),
+                           simulation_.deformed_corners());
+    last_written_ = step;
+  }
+
+  void warn(const std::string& what) {
+    summary_.warnings.push_back(what);
+    complain("warning: " + what);
   }
 
   void draw() {
@@ -138,8 +153,7 @@ class Run {
       drawn_ = true;
     } catch (const std::exception& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");
-      summary_.warnings.push_back(text("no preview.png: ", error.what()));
-      complain("warning: " + summary_.warnings.back());
+      warn(text("no preview.png: ", error.what()));
     }
   }
 
@@ -154,6 +168,9 @@ class Run {
     summary_.hanging = s.hanging();
     summary_.pieces = s.pieces();
     summary_.links_cut = s.links_cut();
+    summary_.surface = scene_.setup.surface;
+    summary_.surface_points = surface_.reference.size();
+    summary_.surface_triangles = surface_.triangles.size();
     for (const auto& level : s.hierarchy().levels) {
       summary_.level_cells.push_back(static_cast<std::size_t>(level.cells()));
       summary_.level_vertices.push_back(static_cast<std::size_t>(level.vertices()));
@@ -210,6 +227,7 @@ class Run {
   ProgressBar bar_;
   Summary summary_;
   Snapshot snapshot_;              // of step last_written_
+  SurfaceMesh surface_;            // the same; empty if the scene asks for none
   std::vector<std::size_t> hits_;  // links met, per cut
   std::chrono::steady_clock::time_point begin_{};
   std::string missed_;

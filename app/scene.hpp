@@ -13,9 +13,14 @@
 namespace kerf {
 
 struct OutputSettings {
-  int every = 1;        ///< a body file every so many steps; the first and last are always written
+  int every = 1;        ///< files every so many steps; of the first and last state always
   bool vtu = true;      ///< body_NNNN.vtu
-  bool pvd = true;      ///< body.pvd, the series for ParaView; needs vtu
+  bool vtp = true;      ///< surface_NNNN.vtp; this and the next two need a surface
+  bool ply = false;     ///< surface_NNNN.ply
+  bool glb = false;     ///< surface_NNNN.glb
+  bool levels = false;  ///< level_K_NNNN.vtu, for figures
+  bool links = false;   ///< links_NNNN.vtp, for figures
+  bool pvd = true;      ///< body.pvd and surface.pvd, the series for ParaView of vtu and vtp
   bool preview = true;  ///< preview.png
 };
 

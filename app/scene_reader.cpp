@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -299,20 +300,47 @@ void read_solver(SceneTable& table, SolverSetup& solver) {
   table.finish();
 }
 
-void read_output(SceneTable& table, OutputSettings& output) {
+void read_formats(const SceneValue& formats, OutputSettings& output, SurfaceMethod surface) {
+  struct Format {
+    const char* name;
+    bool* flag;
+    bool needs_surface;
+  };
+  const Format known[] = {{"vtu", &output.vtu, false},       {"vtp", &output.vtp, true},
+                          {"ply", &output.ply, true},        {"glb", &output.glb, true},
+                          {"levels", &output.levels, false}, {"links", &output.links, false},
+                          {"pvd", &output.pvd, false}};
+  for (const Format& format : known) *format.flag = false;
+  for (std::size_t i = 0; i < formats.size(); ++i) {
+    const SceneValue entry = formats.element(i);
+    const std::string given = entry.string();
+    const auto* const format =
+        std::find_if(std::begin(known), std::end(known),
+                     [&](const Format& candidate) { return given == candidate.name; });
+    if (format == std::end(known))
+      entry.fail(
+          text("must hold names out of \"vtu\", \"vtp\", \"ply\", \"glb\", \"levels\", "
+               "\"links\" and \"pvd\", not \"",
+               given, "\""));
+    if (format->needs_surface && surface == SurfaceMethod::none)
+      entry.fail(text("must not hold \"", given, "\" beside surface = \"none\""));
+    *format->flag = true;
+  }
+  if (output.pvd && !output.vtu && !output.vtp)
+    formats.fail("must hold \"vtu\" or \"vtp\" too: \"pvd\" is the list of these files");
+}
+
+void read_output(SceneTable& table, OutputSettings& output, SurfaceMethod& surface) {
   table.read("every", output.every, 1);
   table.read("preview", output.preview);
-  if (const auto formats = table.find("formats")) {
-    output.vtu = output.pvd = false;
-    for (std::size_t i = 0; i < formats->size(); ++i) {
-      const std::string format = formats->element(i).string();
-      if (format != "vtu" && format != "pvd")
-        formats->element(i).fail(text("must hold \"vtu\" and \"pvd\", not \"", format, "\""));
-      (format == "vtu" ? output.vtu : output.pvd) = true;
-    }
-    if (output.pvd && !output.vtu)
-      formats->fail("must hold \"vtu\" too: \"pvd\" is the list of these files");
-  }
+  table.read_choice("surface", surface,
+                    {{"dual-contouring", SurfaceMethod::dual_contouring},
+                     {"splitting-cubes", SurfaceMethod::splitting_cubes},
+                     {"none", SurfaceMethod::none}});
+  if (const auto formats = table.find("formats"))
+    read_formats(*formats, output, surface);
+  else
+    output.vtp = surface != SurfaceMethod::none;
   table.finish();
 }
 
@@ -336,7 +364,7 @@ void read_sections(SceneTable& root, Scene& scene) {
   if (material) read_material(*material, setup.material);
   if (time) read_time(*time, setup.time);
   if (solver) read_solver(*solver, setup.solver);
-  if (output) read_output(*output, scene.output);
+  if (output) read_output(*output, scene.output, setup.surface);
   for (auto& support : supports) setup.supports.push_back(read_support(support));
   for (auto& load : loads) setup.loads.push_back(read_load(load));
   if (setup.time.mode == TimeMode::statics && setup.supports.empty()) {

@@ -114,7 +114,8 @@ TEST_F(KerfCommand, RunsAndLeavesItsFiles) {
   EXPECT_EQ(outcome.err, "") << "no progress bar in a pipe";
   EXPECT_EQ(names(root_ / "out"),
             (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0002.vtu", "body_0003.vtu",
-                                      "summary.json"}));
+                                      "summary.json", "surface.pvd", "surface_0000.vtp",
+                                      "surface_0002.vtp", "surface_0003.vtp"}));
   for (const char* part : {"folder     out", "cells      54", "steps      3", "links cut  3"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " not in " << outcome.out;
   const auto json = summary();
@@ -122,6 +123,40 @@ TEST_F(KerfCommand, RunsAndLeavesItsFiles) {
   EXPECT_EQ(json["title"], "block");
   EXPECT_EQ(json["links_cut"], 3);
   EXPECT_EQ(json["threads"], 1);
+}
+
+TEST_F(KerfCommand, WritesTheFormatsThatAreAskedFor) {
+  const std::string formats =
+      "--set 'output.formats=[\"ply\", \"glb\", \"levels\", \"links\"]' --set output.every=3 "
+      "--set output.surface=splitting-cubes --set solver.coarsest_vertices=50";
+  const Outcome outcome = run_scene(kBlock + cut_at(0.035, 0.011), formats);
+
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(names(root_ / "out"),
+            (std::vector<std::string>{"level_0_0000.vtu", "level_0_0003.vtu", "level_1_0000.vtu",
+                                      "level_1_0003.vtu", "links_0000.vtp", "links_0003.vtp",
+                                      "summary.json", "surface_0000.glb", "surface_0000.ply",
+                                      "surface_0003.glb", "surface_0003.ply"}));
+  EXPECT_EQ(summary()["surface"]["method"], "splitting-cubes");
+}
+
+TEST_F(KerfCommand, WithoutASurfaceWritesBodiesAlone) {
+  const Outcome outcome = run_scene(kBlock, "--set output.surface=none --set time.duration=0.01");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(names(root_ / "out"), (std::vector<std::string>{"body.pvd", "body_0000.vtu",
+                                                            "body_0001.vtu", "summary.json"}));
+  EXPECT_EQ(summary()["surface"],
+            nlohmann::json({{"method", "none"}, {"points", 0}, {"triangles", 0}}));
+}
+
+TEST_F(KerfCommand, TheSummaryCountsTheSurfaceOfTheLastState) {
+  run_scene(kBlock + cut_at(0.035, 0.011));
+  const std::string vtp = read_all(root_ / "out/surface_0003.vtp");
+  const auto surface = summary()["surface"];
+  for (const auto& [key, name] : {std::pair{"points", "Points"}, {"triangles", "Polys"}})
+    EXPECT_NE(vtp.find(std::string("NumberOf") + name + "=\"" + surface[key].dump() + "\""),
+              std::string::npos)
+        << surface.dump();
 }
 
 TEST_F(KerfCommand, SameSceneGivesTheSameHash) {
@@ -151,7 +186,8 @@ TEST_F(KerfCommand, ReplacesAnEarlierRunAndNothingElse) {
   EXPECT_EQ(run_scene(kBlock, "--set time.duration=0.02").status, 0);
   EXPECT_EQ(names(root_ / "out"),
             (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0001.vtu", "body_0002.vtu",
-                                      "notes.txt", "summary.json"}));
+                                      "notes.txt", "summary.json", "surface.pvd",
+                                      "surface_0000.vtp", "surface_0001.vtp", "surface_0002.vtp"}));
 }
 
 TEST_F(KerfCommand, RefusesBadScenes) {

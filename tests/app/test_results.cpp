@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "app/preview.hpp"
 #include "app/preview_surface.hpp"
 #include "app/progress.hpp"
 #include "app/results.hpp"
 #include "core/base/error.hpp"
+#include "tests/support/files.hpp"
+#include "tests/support/scenes.hpp"
+#include "tests/support/surfaces.hpp"
 
 namespace kerf {
 namespace {
 
 namespace fs = std::filesystem;
+using test::read_all;
+using test::vtk_array;
 
 /// Two unit cells side by side along x that share no vertex: the link between them is cut.
 Snapshot two_cut_cells() {
@@ -49,46 +48,9 @@ Snapshot two_cut_cells() {
   return s;
 }
 
-std::string read_all(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-/// The values of one array of a .vtu, found as a reader would: by its offset in the appended data.
-template <class T>
-std::vector<T> vtu_array(const std::string& vtu, const std::string& name) {
-  std::smatch match;
-  const std::regex pattern("Name=\"" + name + "\"[^>]*offset=\"([0-9]+)\"");
-  const std::string head = vtu.substr(0, vtu.find("<AppendedData"));
-  EXPECT_TRUE(std::regex_search(head, match, pattern)) << name;
-  const std::size_t data = vtu.find('_', vtu.find("<AppendedData")) + 1;
-  const std::size_t at = data + std::stoul(match[1]);
-  std::uint64_t bytes = 0;
-  std::memcpy(&bytes, vtu.data() + at, sizeof bytes);
-  std::vector<T> values(bytes / sizeof(T));
-  std::memcpy(values.data(), vtu.data() + at + sizeof bytes, bytes);
-  return values;
-}
-
-class ResultsTest : public testing::Test {
+class ResultsTest : public test::FolderTest {
  protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    root_ =
-        fs::path(testing::TempDir()) / ("kerf_results_" + std::to_string(getpid()) + info->name());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-  std::vector<std::string> names(const fs::path& folder) {
-    std::vector<std::string> all;
-    for (const auto& entry : fs::directory_iterator(folder))
-      all.push_back(entry.path().filename().string());
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-  void touch(const fs::path& file) { std::ofstream(file) << "x"; }
-  fs::path root_;
+  void touch(const fs::path& file) { test::write_all(file, "x"); }
 };
 
 TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
@@ -97,9 +59,9 @@ TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
   const std::string vtu = read_all(root_ / "a.vtu");
 
   EXPECT_NE(vtu.find("NumberOfPoints=\"16\" NumberOfCells=\"2\""), std::string::npos);
-  const auto points = vtu_array<double>(vtu, "Points");
-  const auto force = vtu_array<double>(vtu, "external_force");
-  const auto displacement = vtu_array<double>(vtu, "displacement");
+  const auto points = vtk_array<double>(vtu, "Points", "Points");
+  const auto force = vtk_array<double>(vtu, "PointData", "external_force");
+  const auto displacement = vtk_array<double>(vtu, "PointData", "displacement");
   ASSERT_EQ(points.size(), 48u);
   ASSERT_EQ(displacement.size(), 48u);
   for (std::size_t i = 0; i < 16; ++i) {
@@ -107,23 +69,24 @@ TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
     EXPECT_EQ(displacement[3 * i + 1], s.displacement[i].y);
     EXPECT_EQ(force[3 * i + 1], -1.0 / 3.0);
   }
-  EXPECT_EQ(vtu_array<double>(vtu, "velocity")[47], 1.0);
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "fixed")[0], 7);
-  const auto masters = vtu_array<std::int32_t>(vtu, "masters");
+  EXPECT_EQ(vtk_array<double>(vtu, "PointData", "velocity")[47], 1.0);
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "PointData", "fixed")[0], 7);
+  const auto masters = vtk_array<std::int32_t>(vtu, "PointData", "masters");
   ASSERT_EQ(masters.size(), 64u);
   EXPECT_EQ(std::vector<std::int32_t>(masters.begin() + 12, masters.begin() + 16),
             (std::vector<std::int32_t>{0, 1, -1, -1}));
   // VTK numbers the corners of a hexahedron around the bottom, then around the top.
-  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "connectivity"),
+  EXPECT_EQ(vtk_array<std::int32_t>(vtu, "Cells", "connectivity"),
             (std::vector<std::int32_t>{0, 1, 3, 2, 4, 5, 7, 6, 8, 9, 11, 10, 12, 13, 15, 14}));
-  EXPECT_EQ(vtu_array<std::int64_t>(vtu, "offsets"), (std::vector<std::int64_t>{8, 16}));
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "types"), (std::vector<std::uint8_t>{12, 12}));
-  EXPECT_EQ(vtu_array<std::uint8_t>(vtu, "level"), (std::vector<std::uint8_t>{0, 0}));
-  EXPECT_EQ(vtu_array<std::int32_t>(vtu, "piece"), (std::vector<std::int32_t>{0, 1}));
-  EXPECT_EQ(vtu_array<double>(vtu, "youngs_modulus"), (std::vector<double>{1e4, 1e4 + 1}));
-  EXPECT_EQ(vtu_array<double>(vtu, "poissons_ratio")[1], 0.4);
-  EXPECT_EQ(vtu_array<double>(vtu, "density")[0], 1000);
-  const auto rotation = vtu_array<double>(vtu, "rotation");
+  EXPECT_EQ(vtk_array<std::int64_t>(vtu, "Cells", "offsets"), (std::vector<std::int64_t>{8, 16}));
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "Cells", "types"), (std::vector<std::uint8_t>{12, 12}));
+  EXPECT_EQ(vtk_array<std::uint8_t>(vtu, "CellData", "level"), (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(vtk_array<std::int32_t>(vtu, "CellData", "piece"), (std::vector<std::int32_t>{0, 1}));
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "youngs_modulus"),
+            (std::vector<double>{1e4, 1e4 + 1}));
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "poissons_ratio")[1], 0.4);
+  EXPECT_EQ(vtk_array<double>(vtu, "CellData", "density")[0], 1000);
+  const auto rotation = vtk_array<double>(vtu, "CellData", "rotation");
   ASSERT_EQ(rotation.size(), 18u);
   EXPECT_EQ(rotation[13], 1.0);
 }
@@ -135,6 +98,9 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
   summary.state_hash = 0xabcULL;
   summary.level_cells = {8, 1};
   summary.level_vertices = {27, 8};
+  summary.surface = SurfaceMethod::splitting_cubes;
+  summary.surface_points = 12;
+  summary.surface_triangles = 20;
   summary.seconds = {{"solve", 1.5}};
   summary.warnings = {"w"};
   StepReport step;
@@ -158,6 +124,10 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_EQ(json["state_hash"], "0000000000000abc");
   EXPECT_EQ(json["levels"], 2);
+  EXPECT_EQ(json["surface"]["method"], "splitting-cubes");
+  EXPECT_EQ(json["surface"]["points"], 12);
+  EXPECT_EQ(json["surface"]["triangles"], 20);
+  EXPECT_EQ(nlohmann::json::parse(to_json({}))["surface"]["method"], "none");
   EXPECT_EQ(json["bytes_per_cell"], 8.0);
   EXPECT_EQ(json["seconds"]["solve"], 1.5);
   EXPECT_EQ(json["steps"][0]["cycles"], 9);
@@ -172,13 +142,58 @@ TEST_F(ResultsTest, CommitGivesNamesAndTheSeries) {
     ResultsFolder results(out, {});
     results.add_snapshot(0, 0.0, two_cut_cells());
     results.add_snapshot(12, 0.25, two_cut_cells());
+    EXPECT_EQ(results.add_surface(12, 0.25, test::two_tetrahedra()), "");
     for (const auto& name : names(out)) EXPECT_EQ(name.front(), '.') << "not finished: " << name;
     results.commit({});
   }
-  EXPECT_EQ(names(out), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0012.vtu",
-                                                  "summary.json"}));
+  EXPECT_EQ(names(out),
+            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0012.vtu", "summary.json",
+                                      "surface.pvd", "surface_0012.vtp"}));
   const std::string pvd = read_all(out / "body.pvd");
   EXPECT_NE(pvd.find("timestep=\"0.25\" part=\"0\" file=\"body_0012.vtu\""), std::string::npos);
+  const std::string surfaces = read_all(out / "surface.pvd");
+  EXPECT_NE(surfaces.find("timestep=\"0.25\" part=\"0\" file=\"surface_0012.vtp\""),
+            std::string::npos);
+  EXPECT_EQ(surfaces.find("body_"), std::string::npos);
+}
+
+/// All formats of surfaces and figures, none of bodies.
+OutputSettings surfaces_and_figures() {
+  OutputSettings settings;
+  settings.vtu = settings.pvd = false;
+  settings.ply = settings.glb = settings.levels = settings.links = true;
+  return settings;
+}
+
+TEST_F(ResultsTest, SurfacesAndFiguresHaveTheirNames) {
+  const LinkedOctree body = test::scene("half_cut");
+  Hierarchy hierarchy;
+  hierarchy.levels.push_back(finest_level(body));
+  build_coarse_levels(hierarchy, {.coarsest_vertices = 1, .max_levels = 2});
+  const std::vector<Vec3d> corners(8 * body.leaf_count());
+  ResultsFolder results(root_, surfaces_and_figures());
+
+  results.add_snapshot(3, 0.1, two_cut_cells());
+  EXPECT_EQ(results.add_surface(3, 0.1, test::two_tetrahedra()), "");
+  results.add_figures(3, body, hierarchy, corners);
+  results.commit({});
+
+  EXPECT_EQ(names(root_),
+            (std::vector<std::string>{"level_0_0003.vtu", "level_1_0003.vtu", "links_0003.vtp",
+                                      "summary.json", "surface_0003.glb", "surface_0003.ply",
+                                      "surface_0003.vtp"}));
+}
+
+TEST_F(ResultsTest, ASurfaceBeyondSinglePrecisionIsKeptWithoutItsGlb) {
+  SurfaceMesh surface = test::two_tetrahedra();
+  surface.displacement[0].x = std::numeric_limits<double>::infinity();
+  ResultsFolder results(root_, surfaces_and_figures());
+
+  EXPECT_EQ(results.add_surface(3, 0.1, surface), "no surface_0003.glb: the body reaches too far");
+  results.commit({});
+
+  EXPECT_EQ(names(root_),
+            (std::vector<std::string>{"summary.json", "surface_0003.ply", "surface_0003.vtp"}));
 }
 
 TEST_F(ResultsTest, WithoutCommitNothingRemains) {
@@ -202,15 +217,35 @@ TEST_F(ResultsTest, WithoutCommitAnEarlierRunStays) {
 
 TEST_F(ResultsTest, StaleFilesOfOursGoOthersStay) {
   ResultsFolder(root_, {}).commit({});  // an earlier run was here
-  for (const char* name : {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "body_x.vtu",
-                           "my_body_0001.vtu", "notes.txt", "body_12.vtu"})
+  for (const char* name :
+       {"body_0007.vtu", ".body_0009.vtu.partial", "preview.png", "surface_0003.vtp",
+        "surface_0003.ply", "surface_12345.glb", ".surface_0004.glb.partial", "level_0_0003.vtu",
+        "level_12_0003.vtu", ".level_1_0003.vtu.partial", "links_0000.vtp", "frame_0001.png"})
     touch(root_ / name);
+  const std::vector<std::string> others = {
+      "body_12.vtu",      "body_x.vtu",      "frame_1.png",      "frame_0001.jpg",
+      "level_0003.vtu",   "level__0003.vtu", "level_a_0003.vtu", "links_0000.vtu",
+      "my_body_0001.vtu", "notes.txt",       "surface_.vtp",     "surface_0003.obj"};
+  for (const auto& name : others) touch(root_ / name);
+
   ResultsFolder results(root_, {});
   results.add_snapshot(0, 0.0, two_cut_cells());
   results.commit({});
-  EXPECT_EQ(names(root_),
-            (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_12.vtu", "body_x.vtu",
-                                      "my_body_0001.vtu", "notes.txt", "summary.json"}));
+
+  std::vector<std::string> expected = others;
+  for (const char* name : {"body.pvd", "body_0000.vtu", "summary.json", "surface.pvd"})
+    expected.push_back(name);
+  std::sort(expected.begin(), expected.end());
+  EXPECT_EQ(names(root_), expected);
+}
+
+TEST_F(ResultsTest, TheSeriesOfAnEarlierRunGoes) {
+  ResultsFolder(root_, {}).commit({});
+  ASSERT_TRUE(fs::exists(root_ / "surface.pvd"));
+  OutputSettings bodies;
+  bodies.vtp = false;
+  ResultsFolder(root_, bodies).commit({});
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"body.pvd", "summary.json"}));
 }
 
 TEST_F(ResultsTest, WhereNoRunWasNothingGoes) {
@@ -220,7 +255,7 @@ TEST_F(ResultsTest, WhereNoRunWasNothingGoes) {
   results.add_snapshot(0, 0.0, two_cut_cells());
   results.commit({});
   EXPECT_EQ(names(root_), (std::vector<std::string>{"body.pvd", "body_0000.vtu", "body_0042.vtu",
-                                                    "preview.png", "summary.json"}));
+                                                    "preview.png", "summary.json", "surface.pvd"}));
 }
 
 TEST_F(ResultsTest, FolderInPlaceOfAFileChangesNothing) {

@@ -49,7 +49,9 @@ TEST(Scene, DefaultsAreThoseOfTheSetup) {
   EXPECT_EQ(scene.setup.solver.tolerance, defaults.solver.tolerance);
   EXPECT_EQ(scene.setup.time.step, defaults.time.step);
   EXPECT_TRUE(scene.setup.cuts.empty());
-  EXPECT_TRUE(scene.output.vtu && scene.output.pvd && scene.output.preview);
+  EXPECT_EQ(scene.setup.surface, SurfaceMethod::dual_contouring);
+  EXPECT_TRUE(scene.output.vtu && scene.output.vtp && scene.output.pvd && scene.output.preview);
+  EXPECT_FALSE(scene.output.ply || scene.output.glb || scene.output.levels || scene.output.links);
   EXPECT_EQ(scene.setup.body.solid->bounds().hi, (Vec3d{0.1, 0.2, 0.3}));
   EXPECT_EQ(scene.setup.body.solid->bounds().lo, (Vec3d{0, 0, 0}));
 }
@@ -120,6 +122,7 @@ duplicate = false
 [output]
 every = 5
 formats = ["vtu"]
+surface = "splitting-cubes"
 preview = false
 )");
 
@@ -176,8 +179,42 @@ preview = false
   EXPECT_FALSE(s.solver.duplicate_cells);
   EXPECT_EQ(scene.output.every, 5);
   EXPECT_TRUE(scene.output.vtu);
+  EXPECT_FALSE(scene.output.vtp);
   EXPECT_FALSE(scene.output.pvd);
   EXPECT_FALSE(scene.output.preview);
+  EXPECT_EQ(s.surface, SurfaceMethod::splitting_cubes);
+}
+
+TEST(Scene, EveryFormatIsRead) {
+  const OutputSettings all =
+      read(kBox + "[output]\nformats = [\"vtp\", \"ply\", \"glb\", \"levels\", \"links\", \"pvd\"]")
+          .output;
+  EXPECT_TRUE(all.vtp && all.ply && all.glb && all.levels && all.links && all.pvd);
+  EXPECT_FALSE(all.vtu);
+  const OutputSettings none = read(kBox + "[output]\nformats = []").output;
+  EXPECT_FALSE(none.vtu || none.vtp || none.ply || none.glb || none.levels || none.links ||
+               none.pvd);
+}
+
+TEST(Scene, WithoutASurfaceTheDefaultFormatsAreThoseOfBodies) {
+  const Scene scene = read(kBox + "[output]\nsurface = \"none\"\n");
+  EXPECT_EQ(scene.setup.surface, SurfaceMethod::none);
+  EXPECT_TRUE(scene.output.vtu && scene.output.pvd);
+  EXPECT_FALSE(scene.output.vtp);
+}
+
+TEST(Scene, FormatsThatCannotBeWrittenAreNamed) {
+  const std::string head = kBox + "[output]\nsurface = \"none\"\n";
+  EXPECT_EQ(error_of(head + "formats = [\"vtu\", \"glb\"]\n"),
+            "scene.toml:7: 'formats' in [output] must not hold \"glb\" beside surface = \"none\"");
+  for (const char* format : {"vtp", "ply", "glb"})
+    expect_parts(error_of(head + "formats = [\"" + format + "\"]\n"), {format, "surface"});
+  EXPECT_EQ(error_of(kBox + "[output]\nformats = [\"pvd\", \"glb\"]\n"),
+            "scene.toml:6: 'formats' in [output] must hold \"vtu\" or \"vtp\" too: \"pvd\" is the "
+            "list of these files");
+  EXPECT_EQ(error_of(kBox + "[output]\nformats = [\"obj\"]\n"),
+            "scene.toml:6: 'formats' in [output] must hold names out of \"vtu\", \"vtp\", \"ply\", "
+            "\"glb\", \"levels\", \"links\" and \"pvd\", not \"obj\"");
 }
 
 TEST(Scene, MistypedKeyNamesLineSectionAndNearestName) {
@@ -241,7 +278,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"DuplicateNumber", "[solver]\nduplicate = 1\n", {":6: ", "true or false"}},
         BadScene{"EveryZero", "[output]\nevery = 0\n", {":6: ", "at least 1"}},
         BadScene{"FormatUnknown", "[output]\nformats = [\"obj\"]\n", {":6: ", "\"obj\""}},
-        BadScene{"FormatPvdAlone", "[output]\nformats = [\"pvd\"]\n", {":6: ", "\"vtu\" too"}},
+        BadScene{"FormatPvdAlone",
+                 "[output]\nformats = [\"pvd\"]\n",
+                 {":6: ", "\"vtu\" or \"vtp\" too"}},
+        BadScene{"SurfaceUnknown",
+                 "[output]\nsurface = \"dual-contour\"\n",
+                 {":6: ", "did you mean \"dual-contouring\""}},
         BadScene{"StaticFree", "[time]\nmode = \"static\"\n", {":6: ", "[[support]]"}},
         BadScene{"SupportNoBox", "[[support]]\naxes = \"x\"\n", {":5: ", "needs 'box'"}},
         BadScene{
