@@ -148,8 +148,14 @@ class Run {
 
   void draw() {
     if (!scene_.output.preview) return;
+    if (scene_.setup.surface == SurfaceMethod::none) {
+      if (scene_.places.contains("output.preview"))
+        warn("no preview.png: output.surface is \"none\"");
+      return;
+    }
     try {
-      draw_preview(results_.add_file("preview.png"), snapshot_, {.up = up_direction(scene_.setup)});
+      draw_preview(results_.add_file("preview.png"), surface_,
+                   {.up = up_direction(scene_.setup), .threads = simulation_.backend().threads()});
       drawn_ = true;
     } catch (const std::exception& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");
