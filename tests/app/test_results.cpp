@@ -297,5 +297,16 @@ TEST(Progress, LineFitsAndSaysWhatCounts) {
   EXPECT_EQ(progress_line(state, 30).size(), 30u);
 }
 
+TEST(Progress, FramesHaveNoTimeOfTheirOwn) {
+  ProgressState state;
+  state.step = 3;
+  state.steps = 12;
+  state.time = -1;
+  state.unit = "frame";
+  state.seconds_per_step = 1.25;
+  state.seconds_left = 11;
+  EXPECT_EQ(progress_line(state, 200), "[#####---------------] 3/12  1.25 s/frame  11 s left");
+}
+
 }  // namespace
 }  // namespace kerf
