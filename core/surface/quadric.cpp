@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -28,10 +29,10 @@ struct Quadric {
   Vec b = Vec::Zero();
   Vec mean = Vec::Zero();
   int hits = 0;
-  bool flat = true;  // all normals are the same
+  double at_mean = 0;  // the energy there
+  bool flat = true;    // all normals are the same
   Vec3d normal{};
-  Eigenvalues eigen;   // of A, unless flat
-  double largest = 0;  // eigenvalue
+  double largest = 0;  // eigenvalue of A
 
   Quadric(std::span<const SurfaceHit> all, bool firm) {
     for (const SurfaceHit& hit : all) {
@@ -47,49 +48,62 @@ struct Quadric {
     if (hits == 0) return;
     mean /= hits;
     largest = hits * dot(normal, normal);
-    if (flat) return;  // the common case, without eigenvectors
-    eigen.compute(a);
-    largest = eigen.eigenvalues()[2];
+    for (const SurfaceHit& hit : all) {
+      if (hit.firm != firm) continue;
+      const double off = to_eigen(hit.normal).dot(mean - to_eigen(hit.point));
+      at_mean += off * off;
+    }
+    if (!flat) largest = Eigenvalues(a, Eigen::EigenvaluesOnly).eigenvalues()[2];
   }
 
-  double energy(const Vec& x) const { return x.dot(a * x) - 2 * b.dot(x); }
+  /// The sum of squares; without its constant it would cancel.
+  double energy(const Vec& x) const {
+    const Vec from_mean = x - mean;
+    return from_mean.dot(a * from_mean) - 2 * (b - a * mean).dot(from_mean) + at_mean;
+  }
 };
 
-/// A^-1 b over the directions that count: those with eigenvalues that are not small.
-Vec apply_inverse(const Eigenvalues& eigen, double largest, const Vec& b) {
+/// The directions of `eigen` that count: those with eigenvalues that are not small.
+template <class Visit>
+void for_counting(const Eigenvalues& eigen, double largest, const Visit& visit) {
+  for (int k = 0; k < 3; ++k)
+    if (eigen.eigenvalues()[k] > kSmooth * largest)
+      visit(Vec(eigen.eigenvectors().col(k)), eigen.eigenvalues()[k]);
+}
+
+/// A place for the vertex, and how badly it fits.
+struct Place {
   Vec x = Vec::Zero();
-  for (int k = 0; k < 3; ++k) {
-    const double value = eigen.eigenvalues()[k];
-    if (!(value > kSmooth * largest)) continue;
-    const Vec along = eigen.eigenvectors().col(k);
-    x += along.dot(b) / value * along;
-  }
-  return x;
-}
+  double first = 0, second = 0;  // energies
+};
 
-/// The least x with `free` components unknown and the others given, nearest to the mean in
-/// directions that do not count.
-Vec solve(const Quadric& q, Vec x, unsigned free) {
-  Mat a = Mat::Zero();
-  Vec b = Vec::Zero();
-  for (int i = 0; i < 3; ++i) {
-    if ((free >> i & 1) == 0) continue;
-    b[i] = q.b[i];
-    for (int j = 0; j < 3; ++j) {
-      const bool unknown = (free >> j & 1) != 0;
-      b[i] -= q.a(i, j) * (unknown ? q.mean[j] : x[j]);
-      if (unknown) a(i, j) = q.a(i, j);
+/// The least of `first`, and in the directions that it leaves open the least of `second`, nearest
+/// to `mean` in those that neither counts. Only the `free` components of x are unknown.
+Place solve(const Quadric& first, const Quadric& second, const Vec& mean, Vec x, unsigned free) {
+  Mat open = Mat::Zero();  // projects onto the directions that are not settled yet
+  for (int d = 0; d < 3; ++d)
+    if ((free >> d & 1) != 0) {
+      open(d, d) = 1;
+      x[d] = mean[d];
     }
+  for (const Quadric* q : {&first, &second}) {
+    if (q->hits == 0) continue;
+    const Vec b = open * (q->b - q->a * x);
+    Mat settled = Mat::Zero();
+    for_counting(Eigenvalues(open * q->a * open), q->largest, [&](Vec along, double value) {
+      along = open * along;  // eigenvectors are not to the last bit in what is open
+      x += along.dot(b) / value * along;
+      settled += along * along.transpose();
+    });
+    open -= settled;
   }
-  const Vec step = apply_inverse(Eigenvalues(a), q.largest, b);
-  for (int i = 0; i < 3; ++i)
-    if ((free >> i & 1) != 0) x[i] = q.mean[i] + step[i];
-  return x;
+  return {x, first.energy(x), second.energy(x)};
 }
 
-/// The least energy over the faces, edges and corners of the cube.
-Vec solve_on_boundary(const Quadric& q) {
-  Vec best = q.mean;
+/// The best place on the faces, edges and corners of the cube.
+Vec solve_on_boundary(const Quadric& first, const Quadric& second, const Vec& mean) {
+  std::array<Place, 26> places;
+  std::size_t count = 0;
   double least = std::numeric_limits<double>::infinity();
   for (int part = 1; part < 27; ++part) {  // per axis: free, at the low side, at the high side
     const int state[3] = {part % 3, part / 3 % 3, part / 9};
@@ -99,57 +113,49 @@ Vec solve_on_boundary(const Quadric& q) {
       if (state[d] == 0) free |= 1u << d;
       if (state[d] != 0) x[d] = state[d] == 1 ? -kHalf : kHalf;
     }
-    x = solve(q, x, free);
-    const double energy = q.energy(x);
-    if (!in_cube(x) || !(energy < least)) continue;
-    least = energy;
-    best = x;
+    const Place place = solve(first, second, mean, x, free);
+    if (!in_cube(place.x)) continue;
+    least = std::min(least, place.first);
+    places[count++] = place;
+  }
+  // Of those that fit the first hits about as well, those that fit the second best; of these, as
+  // the two ends of an edge that runs through the cube, the nearest to the mean.
+  constexpr double kAlike = 4, kTie = 1e-12;  // squares of distances
+  const double limit = (second.hits == 0 ? 1 : kAlike) * std::max(least, 0.0) + kTie;
+  double least_second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count; ++i)
+    if (places[i].first <= limit) least_second = std::min(least_second, places[i].second);
+  Vec best = mean;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double distance = (places[i].x - mean).squaredNorm();
+    if (places[i].first > limit || places[i].second > least_second + kTie || distance >= nearest)
+      continue;
+    nearest = distance;
+    best = places[i].x;
   }
   return best;
 }
 
-Vec fit(const Quadric& q) {
-  if (q.flat || !(q.largest > 0)) return q.mean;
-  const Vec x = q.mean + apply_inverse(q.eigen, q.largest, q.b - q.a * q.mean);
-  return in_cube(x) ? x : solve_on_boundary(q);
-}
-
-/// From x, which lies in the cube, towards y until the cube ends.
-Vec stay_in_cube(const Vec& x, const Vec& y) {
-  double part = 1;
-  for (int d = 0; d < 3; ++d) {
-    if (y[d] > kHalf) part = std::min(part, (kHalf - x[d]) / (y[d] - x[d]));
-    if (y[d] < -kHalf) part = std::min(part, (-kHalf - x[d]) / (y[d] - x[d]));
-  }
-  return x + std::max(part, 0.0) * (y - x);
-}
-
-/// Fits `soft` in the directions that `firm` leaves open.
-Vec fit_along(const Quadric& firm, const Quadric& soft) {
-  const Vec x = fit(firm);
-  Mat open = Mat::Zero();  // projects onto those directions
-  if (firm.flat) {
-    const Vec n = to_eigen(firm.normal);
-    open = Mat::Identity() - n * n.transpose() / std::max(n.squaredNorm(), 1e-300);
-  } else {
-    for (int k = 0; k < 3; ++k) {
-      const Vec along = firm.eigen.eigenvectors().col(k);
-      if (!(firm.eigen.eigenvalues()[k] > kSmooth * firm.largest))
-        open += along * along.transpose();
-    }
-  }
-  const Vec mean = (firm.hits * firm.mean + soft.hits * soft.mean) / (firm.hits + soft.hits);
-  const Vec start = stay_in_cube(x, x + open * (mean - x));
-  const Vec step = apply_inverse(Eigenvalues(open * soft.a * open), soft.largest,
-                                 open * (soft.b - soft.a * start));
-  return stay_in_cube(start, start + open * step);
+Vec fit(const Quadric& first, const Quadric& second) {
+  const Vec mean =
+      (first.hits * first.mean + second.hits * second.mean) / (first.hits + second.hits);
+  if (!(first.largest > 0)) return mean;
+  const Place place = solve(first, second, mean, Vec::Zero(), 7);
+  return in_cube(place.x) ? place.x : solve_on_boundary(first, second, mean);
 }
 
 }  // namespace
 
 Vec3d fit_vertex(std::span<const SurfaceHit> hits) {
   const Quadric firm(hits, true), soft(hits, false);
-  const Vec x = firm.hits == 0 ? fit(soft) : soft.hits == 0 ? fit(firm) : fit_along(firm, soft);
+  Vec x;
+  if (firm.hits > 0 && soft.hits > 0) {
+    x = fit(firm, soft);
+  } else {
+    const Quadric &some = firm.hits > 0 ? firm : soft, &none = firm.hits > 0 ? soft : firm;
+    x = some.flat ? some.mean : fit(some, none);  // flat is the common case
+  }
   Vec3d out;
   for (int d = 0; d < 3; ++d) out[d] = std::clamp(x[d], -kHalf, kHalf);
   return out;
