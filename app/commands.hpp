@@ -26,7 +26,18 @@ struct RunOptions {
   bool quiet = false;
 };
 
+struct RenderOptions {
+  std::filesystem::path folder;
+  std::filesystem::path out;   ///< empty: folder
+  bool frames = false;         ///< the series; else its last picture only
+  std::string size, view, up;  ///< as given, such as "1200x900", "35,22", "0,1,0"; empty: not given
+  int samples = 4;
+  bool quiet = false;
+};
+
 int run_command(const RunOptions& options);
+/// Pictures of the surface files that a run left.
+int render_command(const RenderOptions& options);
 /// Everything that `run` does before its first step, and what it would need.
 int check_command(const std::filesystem::path& scene, const std::vector<std::string>& overrides);
 int info_command();

@@ -33,9 +33,10 @@ std::string duration_text(double seconds) {
 std::string progress_line(const ProgressState& s, int width) {
   const double part = s.steps > 0 ? std::min(1.0, static_cast<double>(s.step) / s.steps) : 0.0;
   const auto full = static_cast<std::size_t>(std::lround(part * kBarWidth));
-  std::string line = fmt::format("[{}{}] {}/{}  t {:.3f} s", std::string(full, '#'),
-                                 std::string(kBarWidth - full, '-'), s.step, s.steps, s.time);
-  if (s.seconds_per_step > 0) line += fmt::format("  {:.2f} s/step", s.seconds_per_step);
+  std::string line = fmt::format("[{}{}] {}/{}", std::string(full, '#'),
+                                 std::string(kBarWidth - full, '-'), s.step, s.steps);
+  if (s.time >= 0) line += fmt::format("  t {:.3f} s", s.time);
+  if (s.seconds_per_step > 0) line += fmt::format("  {:.2f} s/{}", s.seconds_per_step, s.unit);
   if (s.cycles > 0) line += fmt::format("  {} cycles  res {:.1e}", s.cycles, s.residual);
   if (s.seconds_left >= 0) line += fmt::format("  {} left", duration_text(s.seconds_left));
   if (!s.phase.empty()) line += "  " + s.phase;
@@ -52,6 +53,12 @@ void ProgressBar::start(int steps) {
   draw();
 }
 
+void ProgressBar::start_frames(int frames) {
+  state_.time = -1;
+  state_.unit = "frame";
+  start(frames);
+}
+
 void ProgressBar::phase(const char* name, int cycles, double residual) {
   if (!enabled_) return;
   state_.phase = name;
@@ -62,11 +69,19 @@ void ProgressBar::phase(const char* name, int cycles, double residual) {
 
 void ProgressBar::finished(const StepReport& step) {
   if (!enabled_) return;
-  state_.step = std::min(state_.step + 1, std::max(state_.steps, 1));
   state_.time = step.time;
-  state_.seconds_per_step = step.seconds;
   state_.cycles = step.cycles;
   state_.residual = step.linear_residual;
+  advance(step.seconds);
+}
+
+void ProgressBar::finished_frame(double seconds) {
+  if (enabled_) advance(seconds);
+}
+
+void ProgressBar::advance(double seconds) {
+  state_.step = std::min(state_.step + 1, std::max(state_.steps, 1));
+  state_.seconds_per_step = seconds;
   state_.phase.clear();
   const double spent = std::chrono::duration<double>(Clock::now() - begin_).count();
   state_.seconds_left = spent / state_.step * std::max(0, state_.steps - state_.step);

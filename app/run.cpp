@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 
 #include "app/backends.hpp"
 #include "app/commands.hpp"
+#include "app/interrupt.hpp"
 #include "app/preview.hpp"
 #include "app/progress.hpp"
 #include "app/results.hpp"
@@ -18,33 +18,6 @@
 
 namespace kerf {
 namespace {
-
-volatile std::sig_atomic_t interrupt_asked = 0;
-
-/// While it lives, an interrupt (or a request to terminate) asks the run to stop after the step; a
-/// second one ends it at once.
-class InterruptGuard {
- public:
-  InterruptGuard() {
-    interrupt_asked = 0;
-    struct sigaction action {};
-    action.sa_handler = [](int) { interrupt_asked = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGINT, &action, &before_);
-    sigaction(SIGTERM, &action, &before_terminate_);
-  }
-  ~InterruptGuard() {
-    sigaction(SIGINT, &before_, nullptr);
-    sigaction(SIGTERM, &before_terminate_, nullptr);
-  }
-  InterruptGuard(const InterruptGuard&) = delete;
-  InterruptGuard& operator=(const InterruptGuard&) = delete;
-  static bool asked() { return interrupt_asked != 0; }
-
- private:
-  struct sigaction before_ {};
-  struct sigaction before_terminate_ {};
-};
 
 std::size_t peak_bytes() {
   rusage usage{};
@@ -175,8 +148,14 @@ class Run {
 
   void draw() {
     if (!scene_.output.preview) return;
+    if (scene_.setup.surface == SurfaceMethod::none) {
+      if (scene_.places.contains("output.preview"))
+        warn("no preview.png: output.surface is \"none\"");
+      return;
+    }
     try {
-      draw_preview(results_.add_file("preview.png"), snapshot_, {.up = up_direction(scene_.setup)});
+      draw_preview(results_.add_file("preview.png"), surface_,
+                   {.up = up_direction(scene_.setup), .threads = simulation_.backend().threads()});
       drawn_ = true;
     } catch (const std::exception& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");

@@ -5,19 +5,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
-#include <filesystem>
+#include <cstdio>
 #include <fstream>
-#include <iterator>
-#include <nlohmann/json.hpp>
 #include <thread>
 
-namespace {
+#include "tests/support/kerf_command.hpp"
 
-namespace fs = std::filesystem;
+namespace kerf::test {
+namespace {
 
 // A block of 6 x 3 x 3 cells that stands on its low end and takes three steps.
 const std::string kBlock = R"(
@@ -50,62 +47,6 @@ std::string cut_at(double x, double top, const std::string& more = "") {
   return "[[cut]]\n" + more + "lines = [[" + point(-0.05, -1) + "," + point(-0.05, 1) + "],[" +
          point(top, -1) + "," + point(top, 1) + "]]\n";
 }
-
-struct Outcome {
-  int status;
-  std::string out, err;
-};
-
-class KerfCommand : public testing::Test {
- protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    root_ = fs::path(testing::TempDir()) / ("kerf_cli_" + std::to_string(getpid()) + info->name());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
-  static std::string read_all(const fs::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  }
-
-  /// Runs `kerf ARGUMENTS` in the test's folder.
-  Outcome kerf(const std::string& arguments) {
-    const std::string command = "cd '" + root_.string() + "' && '" KERF_COMMAND "' " + arguments +
-                                " >stdout.txt 2>stderr.txt </dev/null";
-    const int status = std::system(command.c_str());
-    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_all(root_ / "stdout.txt"),
-                    read_all(root_ / "stderr.txt")};
-    fs::remove(root_ / "stdout.txt");
-    fs::remove(root_ / "stderr.txt");
-    return outcome;
-  }
-  Outcome run_scene(const std::string& toml, const std::string& arguments = "") {
-    std::ofstream(root_ / "scene.toml") << toml;
-    return kerf("run scene.toml --out out " + arguments);
-  }
-  std::vector<std::string> names(const fs::path& folder) {
-    std::vector<std::string> all;
-    for (const auto& entry : fs::directory_iterator(folder))
-      all.push_back(entry.path().filename().string());
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-  /// One message, this status, and no folder.
-  void expect_refused(const Outcome& outcome, int status, const std::vector<std::string>& parts) {
-    EXPECT_EQ(outcome.status, status) << outcome.err;
-    EXPECT_EQ(outcome.err.rfind("kerf: error: ", 0), 0u) << outcome.err;
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    for (const auto& part : parts)
-      EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in " << outcome.err;
-    EXPECT_FALSE(fs::exists(root_ / "out")) << "something was left behind";
-  }
-  nlohmann::json summary() { return nlohmann::json::parse(read_all(root_ / "out/summary.json")); }
-
-  fs::path root_;
-};
 
 TEST_F(KerfCommand, RunsAndLeavesItsFiles) {
   const Outcome outcome = run_scene(kBlock + cut_at(0.035, 0.011), "--set output.every=2");
@@ -172,6 +113,16 @@ TEST_F(KerfCommand, DrawsAPictureWhereItCan) {
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(fs::exists(root_ / "out/preview.png"), ready);
   EXPECT_EQ(outcome.err.find("KERF_PREVIEW") == std::string::npos, ready) << outcome.err;
+}
+
+TEST_F(KerfCommand, SaysWhyThereIsNoPictureWithoutASurface) {
+  const std::string brief = "--set output.surface=none --set time.duration=0.01";
+  const Outcome outcome = run_scene(kBlock, "--set output.preview=true " + brief);
+  EXPECT_EQ(outcome.status, 0);
+  const std::string warning = "no preview.png: output.surface is \"none\"";
+  EXPECT_EQ(outcome.err, "kerf: warning: " + warning + "\n");
+  EXPECT_EQ(summary()["warnings"], nlohmann::json({warning}));
+  EXPECT_FALSE(fs::exists(root_ / "out/preview.png"));
 }
 
 TEST_F(KerfCommand, SaysWhenAPieceComesOff) {
@@ -320,3 +271,4 @@ TEST_F(KerfCommand, AnInterruptKeepsTheStepsSoFar) {
 }
 
 }  // namespace
+}  // namespace kerf::test

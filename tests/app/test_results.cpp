@@ -4,8 +4,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "app/preview.hpp"
-#include "app/preview_surface.hpp"
 #include "app/progress.hpp"
 #include "app/results.hpp"
 #include "core/base/error.hpp"
@@ -283,56 +281,6 @@ TEST_F(ResultsTest, FileInPlaceOfTheFolderIsAnError) {
   }
 }
 
-TEST(PreviewSurface, FacesPointOutwardAndKeepTheirCut) {
-  const Snapshot s = two_cut_cells();
-  const PreviewSurface surface = preview_surface(s);
-  ASSERT_EQ(surface.quads.size(), 12u);
-  for (std::size_t q = 0; q < 12; ++q) {
-    const auto& quad = surface.quads[q];
-    const Vec3d area = cross(surface.points[quad[2]] - surface.points[quad[0]],
-                             surface.points[quad[3]] - surface.points[quad[1]]);
-    const auto& face = s.boundary[q];
-    Vec3d outward;
-    outward[face.face / 2] = face.face % 2 == 1 ? 1 : -1;
-    EXPECT_GT(dot(area, outward), 0) << "face " << face.face << " of cell " << face.cell;
-    EXPECT_EQ(surface.cut_id[q], face.cut_id);
-    for (const auto n : surface.normal_of[q]) EXPECT_GT(dot(surface.normals[n], outward), 0);
-  }
-}
-
-TEST(PreviewSurface, SmoothingMovesAPointByHalfACellAtMost) {
-  const Snapshot s = two_cut_cells();
-  const PreviewSurface surface = preview_surface(s);
-  ASSERT_EQ(surface.points.size(), s.points.size());
-  Box3 before, after;
-  for (std::size_t i = 0; i < s.points.size(); ++i) before.add(s.points[i] + s.displacement[i]);
-  for (const auto& p : surface.points) after.add(p);
-  const double limit = 0.5 * surface.cell + 1e-12;  // rounding
-  EXPECT_LE(norm(before.lo - after.lo), 1.7320508075688773 * limit);
-  EXPECT_LE(norm(before.hi - after.hi), 1.7320508075688773 * limit);
-}
-
-TEST(PreviewSurface, CrumbsDoNotCountForTheFrame) {
-  Snapshot s = two_cut_cells();
-  EXPECT_EQ(preview_surface(s).framed.size(), 16u);
-  for (int i = 0; i < 150; ++i)  // now the second cell has less than a hundredth of the faces
-    for (int face = 0; face < 6; ++face) s.boundary.push_back({0, face, 0});
-  EXPECT_EQ(preview_surface(s).framed.size(), 8u);
-}
-
-TEST_F(ResultsTest, PreviewIsAPictureAndTheSameEachTime) {
-  if (!can_draw_preview()) GTEST_SKIP() << "built without Embree or libpng";
-  PreviewOptions options;
-  options.width = 80;
-  options.height = 60;
-  draw_preview(root_ / "a.png", two_cut_cells(), options);
-  draw_preview(root_ / "b.png", two_cut_cells(), options);
-  const std::string a = read_all(root_ / "a.png");
-  ASSERT_GT(a.size(), 100u);
-  EXPECT_EQ(a.substr(1, 3), "PNG");
-  EXPECT_EQ(a, read_all(root_ / "b.png"));
-}
-
 TEST(Progress, LineFitsAndSaysWhatCounts) {
   ProgressState state;
   state.step = 5;
@@ -347,6 +295,17 @@ TEST(Progress, LineFitsAndSaysWhatCounts) {
        {"[##########----------]", "5/10", "0.50 s/step", "12 cycles", "3.0e-07", "2:05 min left"})
     EXPECT_NE(line.find(part), std::string::npos) << part << " not in " << line;
   EXPECT_EQ(progress_line(state, 30).size(), 30u);
+}
+
+TEST(Progress, FramesHaveNoTimeOfTheirOwn) {
+  ProgressState state;
+  state.step = 3;
+  state.steps = 12;
+  state.time = -1;
+  state.unit = "frame";
+  state.seconds_per_step = 1.25;
+  state.seconds_left = 11;
+  EXPECT_EQ(progress_line(state, 200), "[#####---------------] 3/12  1.25 s/frame  11 s left");
 }
 
 }  // namespace

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+//
+// From light to pixels: many samples at edges, few elsewhere, and no noise.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "app/studio.hpp"
+
+namespace kerf {
+
+struct Canvas {
+  int width = 0, height = 0;
+  int samples = 4;  ///< per pixel and direction at edges
+  int threads = 0;  ///< 0: as many as the machine has
+};
+
+/// Rows from above, three bytes of sRGB for each pixel. The same bits for any number of threads.
+std::vector<std::uint8_t> paint(const Studio& studio, const Canvas& canvas);
+
+}  // namespace kerf
