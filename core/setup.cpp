@@ -87,8 +87,6 @@ void validate(const SimulationSetup& setup) {
           "solver.cycles must not be negative; max_cycles and rotation_updates at least 1");
   expects(solver.coarsest_vertices >= 1 && solver.max_levels >= 0,
           "solver.coarsest_vertices must be at least 1, max_levels not negative");
-  expects(solver.precision == Precision::double_,
-          "this version computes in double only; set solver.precision = \"double\"");
 }
 
 }  // namespace kerf

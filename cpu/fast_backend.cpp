@@ -71,10 +71,11 @@ void with_types(From& from, To& to, const Body& body) {
 template <class S>
 struct FastLevel {
   PackedLevel packed;
-  std::vector<S> matrices;          // [group][300][8], levels above 0
-  std::vector<S> inverse_diagonal;  // six a vertex: xx xy xz yy yz zz
-  std::vector<FastVector> vectors;  // by VectorId
-  double bound = 0;                 // of the spectrum of D^-1 A
+  std::vector<S> matrices;                               // [group][300][8], levels above 0
+  std::vector<S> inverse_diagonal;                       // six a vertex: xx xy xz yy yz zz
+  std::vector<kernels::WeightColumns<Pack<S>>> columns;  // of the weights to the next level
+  std::vector<FastVector> vectors;                       // by VectorId
+  double bound = 0;                                      // of the spectrum of D^-1 A
   bool solution_is_zero = false;
 
   std::int32_t vertices() const { return packed.level->vertices(); }
@@ -164,6 +165,7 @@ class FastBackend final : public Backend {
 #pragma omp parallel for num_threads(threads_) schedule(static) if (count >= worth)
     for (std::int32_t i = 0; i < count; ++i) body(i);
   }
+  static constexpr std::int32_t kWorthMatrices = 8;  // groups whose matrices are made
   static constexpr std::int32_t kWorthGroups = 64;
   static constexpr std::int32_t kWorthVertices = 4096;
   static constexpr std::int32_t kWorthScalars = 65536;
@@ -183,6 +185,8 @@ class FastBackend final : public Backend {
   void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
   template <class A, class B>
   double dot_typed(const A* a, const B* b, std::int32_t size) const;
+  void add_children(const FastLevel<S>& from, bool finest,
+                    const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
   void chebyshev(int level);
   void expects_exact(int in, int out) const {
     ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
@@ -288,7 +292,10 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
-    level.packed = pack_level(hierarchy, l);
+    level.packed = pack_level(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].packed);
+    level.columns.clear();
+    for (const Weights& w : l == 0 ? level.packed.from_corners : level.packed.from_slots)
+      level.columns.push_back(columns_of<Pack<S>>(w));
     level.bound = 0;
     level.solution_is_zero = false;
     level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
@@ -443,39 +450,66 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
            [&](std::int32_t v) { store(to, v, sum_records<double>(l.packed, all, v)); });
 }
 
+// The n-th children of the coarse cells in the lanes: their matrices and their weights.
+template <class S>
+void FastBackend<S>::add_children(const FastLevel<S>& from, bool finest,
+                                  const std::int32_t (&child)[Pack<S>::kLanes],
+                                  Pack<S> (&sum)[kEntries]) const {
+  using P = Pack<S>;
+  const PackedLevel& packed = from.packed;
+  P full[24][24];
+  bool over_slots = true;
+  if (finest) {
+    const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
+    corner_matrices(packed, values_of<S>(), lanes, full);
+    // Held components are those of slots, so there the way from corners has two steps.
+    over_slots = lanes.any_fixed;
+    if (lanes.any_fixed && lanes.any_folded) fold_matrices(packed, lanes, full);
+    if (lanes.any_fixed) mask_matrices(packed, lanes, full);
+  } else {
+    stored_matrices(packed, from.matrices.data(), child, full);
+  }
+  const std::vector<Weights>& table = over_slots ? packed.from_slots : packed.from_corners;
+  const Weights* w[P::kLanes];
+  std::int32_t first = -1;
+  bool alike = over_slots != finest;  // the columns that are at hand
+  for (int k = 0; k < P::kLanes; ++k) {
+    w[k] = nullptr;
+    if (child[k] < 0) continue;  // its matrix is zero
+    const std::int32_t index = packed.weights[child[k]];
+    w[k] = &table[static_cast<std::size_t>(index)];
+    alike = alike && (first < 0 || index == first);
+    first = index;
+  }
+  if (alike)
+    add_product(full, from.columns[static_cast<std::size_t>(first)], sum);
+  else
+    add_product(full, columns_of<P>(w), sum);
+}
+
 template <class S>
 void FastBackend<S>::coarsen(int fine) {
   using P = Pack<S>;
   const FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
   const Level& coarse = *to.packed.level;
-  parallel(to.groups(), 8, [&](std::int32_t g) {
+  parallel(to.groups(), kWorthMatrices, [&](std::int32_t g) {
     for_packs<S>([&](int first) {
       const std::int32_t* cells = to.packed.cell.data() + kGroup * g + first;
-      P sum[kEntries];
-      for (P& entry : sum) entry = P(S(0));
+      P sum[kEntries] = {};
       for (std::int32_t n = 0;; ++n) {
         std::int32_t child[P::kLanes];
-        const float(*w[P::kLanes])[8];
         bool any = false;
         for (int k = 0; k < P::kLanes; ++k) {
           child[k] = -1;
-          w[k] = nullptr;
           if (cells[k] < 0) continue;
           const std::int32_t at = coarse.child_begin[cells[k]] + n;
           if (at >= coarse.child_begin[cells[k] + 1]) continue;
           child[k] = coarse.children[at];
-          w[k] = from.packed.weight_table[from.packed.weights[child[k]]].w;
           any = true;
         }
         if (!any) break;
-        P full[24][24];
-        if (fine == 0)
-          finest_matrices(from.packed, values_of<S>(),
-                          FinestLanes<S>(from.packed, values_of<S>(), scale_, child), full);
-        else
-          stored_matrices(from.packed, from.matrices.data(), child, full);
-        add_product(full, columns_of<P>(w), sum);
+        add_children(from, fine == 0, child, sum);
       }
       S* tile = to.matrices.data() + kEntries * kGroup * static_cast<std::size_t>(g) + first;
       for (int e = 0; e < kEntries; ++e) store_pack(tile + kGroup * e, sum[e]);
@@ -486,19 +520,21 @@ void FastBackend<S>::coarsen(int fine) {
 template <class S>
 void FastBackend<S>::prepare(int level) {
   FastLevel<S>& l = levels_[level];
-  std::vector<S> blocks(8 * 8 * l.packed.cell.size());  // six of eight scalars a record
+  const std::size_t scalars = 8 * 8 * l.packed.cell.size();  // six of eight a record
+  records_.resize(std::max(records_.size(), scalars * sizeof(S) / sizeof(double) + 1));
+  S* const blocks = reinterpret_cast<S*>(records_.data());
   parallel(l.groups(), kWorthGroups, [&](std::int32_t g) {
     const auto group = static_cast<std::size_t>(g);
     if (level == 0)
-      finest_diagonals(l.packed, values_of<S>(), scale_, group, blocks.data());
+      finest_diagonals(l.packed, values_of<S>(), scale_, group, blocks);
     else
-      stored_diagonals(l.matrices.data(), group, blocks.data());
+      stored_diagonals(l.matrices.data(), group, blocks);
   });
   parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
     kernels::Sym3<S> sum{};
     for (std::int32_t k = l.packed.level->incidence_begin[v];
          k < l.packed.level->incidence_begin[v + 1]; ++k) {
-      const S* b = blocks.data() + 8 * static_cast<std::size_t>(l.packed.record[k]);
+      const S* b = blocks + 8 * static_cast<std::size_t>(l.packed.record[k]);
       sum += kernels::Sym3<S>{b[0], b[1], b[2], b[4], b[5], b[6]};
     }
     const std::uint8_t fixed = l.fixed(v);
@@ -522,7 +558,10 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
   cells[0] = cell;
   if (level == 0) {
     Pack<double> full[24][24];
-    finest_matrices(l.packed, exact_, FinestLanes<double>(l.packed, exact_, scale_, cells), full);
+    const FinestLanes<double> lanes(l.packed, exact_, scale_, cells);
+    corner_matrices(l.packed, exact_, lanes, full);
+    if (lanes.any_folded) fold_matrices(l.packed, lanes, full);
+    if (lanes.any_fixed) mask_matrices(l.packed, lanes, full);
     for (int i = 0; i < 24; ++i)
       for (int j = 0; j <= i; ++j)
         out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];

@@ -4,6 +4,7 @@
 // groups and no threads.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "core/backend.hpp"
@@ -182,7 +183,7 @@ template <class S>
 struct FinestLanes {
   using P = Pack<S>;
   kernels::Mat3<P> R;
-  P stiffness, mass;
+  P stiffness{}, mass{};  // none in a lane without a cell
   bool any_folded = false, any_fixed = false;
   int material = -1;  // of the cells; -2 where they differ
   std::int32_t cell[P::kLanes];
@@ -203,8 +204,7 @@ struct FinestLanes {
       stiffness.set(k, static_cast<S>(scale.stiffness) * values.stiffness[lane]);
       mass.set(k, static_cast<S>(scale.mass) * values.mass[lane]);
       any_folded = any_folded || kernels::has_hanging(level.fold[group]);
-      for (const std::int32_t v : level.level->slots[cell[k]])
-        any_fixed = any_fixed || level.level->fixed[v] != 0;
+      any_fixed = any_fixed || level.has_fixed[cell[k]] != 0;
       const int its = level.material[group];
       material = material == -1 || material == its ? its : -2;
     }
@@ -212,23 +212,37 @@ struct FinestLanes {
   }
 };
 
-/// Columns of W with their non-zeros in any lane.
+/// Columns of W, the same in all lanes.
 template <class P>
-kernels::WeightColumns<P> columns_of(const float (*const (&w)[P::kLanes])[8]) {
+kernels::WeightColumns<P> columns_of(const Weights& w) {
   kernels::WeightColumns<P> out{};
   for (int m = 0; m < 8; ++m)
     for (int i = 0; i < 8; ++i) {
-      P weight;
+      if (w.w[i][m] == 0) continue;
+      const int at = out.count[m]++;
+      out.child[m][at] = i;
+      out.weight[m][at] = P(w.w[i][m]);
+    }
+  return out;
+}
+
+/// Columns of the W of each lane, with their non-zeros in any lane; null is a lane without a cell.
+template <class P>
+kernels::WeightColumns<P> columns_of(const Weights* const (&w)[P::kLanes]) {
+  using S = typename P::Scalar;
+  kernels::WeightColumns<P> out{};
+  for (int m = 0; m < 8; ++m)
+    for (int i = 0; i < 8; ++i) {
+      S weight[P::kLanes];
       bool any = false;
       for (int k = 0; k < P::kLanes; ++k) {
-        if (w[k] == nullptr || w[k][i][m] == 0) continue;
-        any = true;
-        weight.set(k, w[k][i][m]);
+        weight[k] = w[k] == nullptr ? S(0) : static_cast<S>(w[k]->w[i][m]);
+        any = any || weight[k] != 0;
       }
       if (!any) continue;
       const int at = out.count[m]++;
       out.child[m][at] = i;
-      out.weight[m][at] = weight;
+      out.weight[m][at] = load_pack(weight);
     }
   return out;
 }
@@ -251,58 +265,74 @@ void add_product(const P (&full)[24][24], const kernels::WeightColumns<P>& colum
   }
 }
 
-/// Matrices of some cells of level 0 over their slots, in full; rows and columns of held components
-/// are zero.
+/// Matrices of some cells of level 0 over their corners, in full.
 template <class S>
-void finest_matrices(const PackedLevel& level, const FinestValues<S>& values,
+void corner_matrices(const PackedMaterial<S>& m, const FinestLanes<S>& lanes,
+                     Pack<S> (&full)[24][24]) {
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const auto block =
+          kernels::rotate_block(m.stiffness, m.mass, lanes.R, lanes.stiffness, lanes.mass, i, j);
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+          full[3 * i + a][3 * j + b] = full[3 * j + b][3 * i + a] =
+              i == j && b > a ? block[b][a] : block[a][b];
+    }
+}
+
+/// The same where lanes may be of several materials.
+template <class S>
+void corner_matrices(const PackedLevel& level, const FinestValues<S>& values,
                      const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
+  if (lanes.material != -2) {
+    const auto material = static_cast<std::size_t>(std::max(lanes.material, 0));
+    return corner_matrices(values.materials[material], lanes, full);
+  }
+  for (std::size_t m = 0; m < values.materials.size(); ++m) {
+    Pack<S> some[24][24];
+    corner_matrices(values.materials[m], lanes, some);
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+      const bool none = lanes.cell[k] < 0;
+      if (!none &&
+          level.material[static_cast<std::size_t>(level.lane[lanes.cell[k]]) / kGroup] != m)
+        continue;
+      for (int i = 0; i < 24; ++i)
+        for (int j = 0; j < 24; ++j) full[i][j].set(k, some[i][j][k]);
+    }
+  }
+}
+
+/// Brings matrices of cells of level 0 from corners to slots.
+template <class S>
+void fold_matrices(const PackedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
   using P = Pack<S>;
-  P packed[kEntries];
-  const auto fill = [&](int material, P(&out)[kEntries]) {
-    const PackedMaterial<S>& m = values.materials[static_cast<std::size_t>(material)];
-    kernels::cell_matrix(m.stiffness, m.mass, lanes.R, lanes.stiffness, lanes.mass,
-                         static_cast<P*>(out));
-  };
-  if (lanes.material >= 0) {
-    fill(lanes.material, packed);
-  } else {  // lanes of several materials, one after the other
-    for (std::size_t m = 0; m < values.materials.size(); ++m) {
-      P some[kEntries];
-      fill(static_cast<int>(m), some);
-      for (int k = 0; k < P::kLanes; ++k) {
-        if (lanes.cell[k] < 0) continue;
-        const auto group = static_cast<std::size_t>(level.lane[lanes.cell[k]]) / kGroup;
-        if (level.material[group] != m) continue;
-        for (int e = 0; e < kEntries; ++e) packed[e].set(k, some[e][k]);
-      }
-    }
+  Weights fold[P::kLanes];
+  const Weights* w[P::kLanes];
+  for (int k = 0; k < P::kLanes; ++k) {
+    w[k] = nullptr;
+    if (lanes.cell[k] < 0) continue;
+    kernels::fold_weights(level.level->fold[lanes.cell[k]], fold[k].w);
+    w[k] = &fold[k];
   }
-  kernels::expand_packed(static_cast<const P*>(packed), full);
-  if (lanes.any_folded) {
-    float fold[P::kLanes][8][8];
-    const float(*w[P::kLanes])[8];
-    for (int k = 0; k < P::kLanes; ++k) {
-      w[k] = nullptr;
+  P sum[kEntries] = {};
+  add_product(full, columns_of<P>(w), sum);
+  kernels::expand_packed(static_cast<const P*>(sum), full);
+}
+
+/// Zero in the rows and columns of held components. Needs  matrices over slots.
+template <class S>
+void mask_matrices(const PackedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
+  Pack<S> keep[24];
+  for (int i = 0; i < 24; ++i) {
+    S of[Pack<S>::kLanes];
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+      of[k] = 1;
       if (lanes.cell[k] < 0) continue;
-      kernels::fold_weights(level.level->fold[lanes.cell[k]], fold[k]);
-      w[k] = fold[k];
+      const std::int32_t v = level.level->slots[lanes.cell[k]][static_cast<std::size_t>(i / 3)];
+      if ((level.level->fixed[v] >> (i % 3) & 1) != 0) of[k] = 0;
     }
-    P sum[kEntries];
-    for (P& entry : sum) entry = P(S(0));
-    add_product(full, columns_of<P>(w), sum);
-    kernels::expand_packed(static_cast<const P*>(sum), full);
+    keep[i] = load_pack(of);
   }
-  if (!lanes.any_fixed) return;
-  P keep[24];
-  for (int i = 0; i < 24; ++i)
-    for (int k = 0; k < P::kLanes; ++k) {
-      const bool held =
-          lanes.cell[k] >= 0 &&
-          (level.level->fixed[level.level->slots[lanes.cell[k]][static_cast<std::size_t>(i / 3)]] >>
-               (i % 3) &
-           1) != 0;
-      keep[i].set(k, held ? S(0) : S(1));
-    }
   for (int i = 0; i < 24; ++i)
     for (int j = 0; j < 24; ++j) full[i][j] *= keep[i] * keep[j];
 }
@@ -312,7 +342,7 @@ template <class S>
 void stored_matrices(const PackedLevel& level, const S* matrices, const std::int32_t* cells,
                      Pack<S> (&full)[24][24]) {
   using P = Pack<S>;
-  P packed[kEntries];
+  P packed[kEntries] = {};
   for (int k = 0; k < P::kLanes; ++k) {
     if (cells[k] < 0) continue;
     const auto lane = static_cast<std::size_t>(level.lane[cells[k]]);

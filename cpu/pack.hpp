@@ -40,7 +40,7 @@ struct Pack {
   using Scalar = S;
   static constexpr int kLanes = kPackBytes / static_cast<int>(sizeof(S));
   typedef S Vector __attribute__((vector_size(kPackBytes)));
-  Vector v{};
+  Vector v;  // Pack{} is zero; an array of packs without braces is not
 
   Pack() = default;
   Pack(const Vector& vector) : v(vector) {}  // NOLINT: packs and vectors are one thing

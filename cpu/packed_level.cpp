@@ -16,30 +16,50 @@ std::size_t bytes_of(const std::vector<T>& array) {
   return array.capacity() * sizeof(T);
 }
 
-/// Cells in the order of their lanes; groups begin anew where a key changes.
-void assign_lanes(const Hierarchy& hierarchy, bool finest, PackedLevel& out) {
+/// What the cells of a group have in common: fold code and material on level 0, the weights of
+/// their children in their order above.
+std::vector<std::vector<std::int32_t>> group_keys(const Hierarchy& hierarchy,
+                                                  const PackedLevel* finer, const Level& level) {
+  std::vector<std::vector<std::int32_t>> keys(level.corner.size());
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    if (finer == nullptr) {
+      keys[c] = {level.fold[c], hierarchy.values[c].material};
+      continue;
+    }
+    for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k)
+      keys[c].push_back(finer->weights[level.children[k]]);
+  }
+  return keys;
+}
+
+/// Cells in the order of their lanes. On level 0 a group begins anew where the key changes.
+void assign_lanes(const Hierarchy& hierarchy, const PackedLevel* finer, PackedLevel& out) {
   const Level& level = *out.level;
-  const auto key = [&](std::int32_t c) {
-    return finest ? std::pair(level.fold[c], hierarchy.values[c].material)
-                  : std::pair(std::uint16_t{0}, std::uint8_t{0});
-  };
+  const bool finest = finer == nullptr;
+  const auto keys = group_keys(hierarchy, finer, level);
   std::vector<std::int32_t> order(level.corner.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(),
-                   [&](std::int32_t a, std::int32_t b) { return key(a) < key(b); });
+                   [&](std::int32_t a, std::int32_t b) { return keys[a] < keys[b]; });
   out.lane.resize(order.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::int32_t c = order[i];
-    if (i > 0 && key(order[i - 1]) != key(c))
+    if (finest && i > 0 && keys[order[i - 1]] != keys[c])
       while (out.cell.size() % kGroup != 0) out.cell.push_back(-1);
     out.lane[c] = static_cast<std::int32_t>(out.cell.size());
     out.cell.push_back(c);
   }
   while (out.cell.size() % kGroup != 0) out.cell.push_back(-1);
+  if (!finest) return;
   for (std::size_t g = 0; g < out.groups(); ++g) {
-    const auto [fold, material] = key(out.cell[kGroup * g]);
-    out.fold.push_back(fold);
-    out.material.push_back(material);
+    const std::int32_t c = out.cell[kGroup * g];
+    out.fold.push_back(level.fold[c]);
+    out.material.push_back(hierarchy.values[c].material);
+  }
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    std::uint8_t any = 0;
+    for (const std::int32_t v : level.slots[c]) any = any | level.fixed[v];
+    out.has_fixed.push_back(any);
   }
 }
 
@@ -99,12 +119,18 @@ void fill_weights(const Level& coarse, PackedLevel& out) {
   for (std::int32_t c = 0; c < fine.cells(); ++c) {
     const auto key = std::tuple(fine.fold[c], fine.place[c], coarse.fold[fine.parent[c]]);
     const auto [entry, added] =
-        known.try_emplace(key, static_cast<std::int32_t>(out.weight_table.size()));
+        known.try_emplace(key, static_cast<std::int32_t>(out.from_slots.size()));
     out.weights[c] = entry->second;
     if (!added) continue;
-    Weights w;
-    kernels::transfer_weights(std::get<0>(key), std::get<1>(key), std::get<2>(key), w.w);
-    out.weight_table.push_back(w);
+    Weights slots, corners{};
+    float fold[8][8];
+    kernels::transfer_weights(std::get<0>(key), std::get<1>(key), std::get<2>(key), slots.w);
+    kernels::fold_weights(std::get<0>(key), fold);
+    for (int i = 0; i < 8; ++i)
+      for (int m = 0; m < 8; ++m)
+        for (int j = 0; j < 8; ++j) corners.w[i][m] += fold[i][j] * slots.w[j][m];
+    out.from_slots.push_back(slots);
+    out.from_corners.push_back(corners);
   }
 }
 
@@ -114,13 +140,14 @@ std::size_t PackedLevel::bytes() const {
   return bytes_of(cell) + bytes_of(lane) + bytes_of(slots) + bytes_of(fold) + bytes_of(material) +
          bytes_of(record) + bytes_of(prolong.begin) + bytes_of(prolong.vertex) +
          bytes_of(prolong.weight) + bytes_of(restrict_.begin) + bytes_of(restrict_.vertex) +
-         bytes_of(restrict_.weight) + bytes_of(weights) + bytes_of(weight_table);
+         bytes_of(restrict_.weight) + bytes_of(weights) + bytes_of(from_slots) +
+         bytes_of(from_corners) + bytes_of(has_fixed);
 }
 
-PackedLevel pack_level(const Hierarchy& hierarchy, std::size_t index) {
+PackedLevel pack_level(const Hierarchy& hierarchy, std::size_t index, const PackedLevel* finer) {
   PackedLevel out;
   out.level = &hierarchy.levels[index];
-  assign_lanes(hierarchy, index == 0, out);
+  assign_lanes(hierarchy, finer, out);
   place_slots(out);
   if (index + 1 < hierarchy.levels.size()) {
     fill_transfer(hierarchy.levels[index + 1], out);

@@ -40,23 +40,25 @@ struct Weights {
 
 struct PackedLevel {
   const Level* level = nullptr;
-  std::vector<std::int32_t> cell;      // per lane, -1: none
-  std::vector<std::int32_t> lane;      // per cell
-  std::vector<std::int32_t> slots;     // [group][8][8]
-  std::vector<std::uint16_t> fold;     // per group, level 0 only
-  std::vector<std::uint8_t> material;  // per group, level 0 only
-  std::vector<std::int32_t> record;    // per incidence, in the order of level->incidence
-  SparseWeights prolong;               // rows: vertices of this level; columns: of the next
-  SparseWeights restrict_;             // rows: vertices of the next level; columns: of this one
-  std::vector<std::int32_t> weights;   // per cell: which of the weights below, to its parent
-  std::vector<Weights> weight_table;
+  std::vector<std::int32_t> cell;       // per lane, -1: none
+  std::vector<std::int32_t> lane;       // per cell
+  std::vector<std::int32_t> slots;      // [group][8][8]
+  std::vector<std::uint16_t> fold;      // per group, level 0 only
+  std::vector<std::uint8_t> material;   // per group, level 0 only
+  std::vector<std::int32_t> record;     // per incidence, in the order of level->incidence
+  SparseWeights prolong;                // rows: vertices of this level; columns: of the next
+  SparseWeights restrict_;              // rows: vertices of the next level; columns: of this one
+  std::vector<std::int32_t> weights;    // per cell: which of the weights below, to its parent
+  std::vector<Weights> from_slots;      // W of a stored matrix, which is over slots
+  std::vector<Weights> from_corners;    // and of one over corners, level 0
+  std::vector<std::uint8_t> has_fixed;  // per cell of level 0
 
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return level->point.size(); }
   std::size_t bytes() const;
 };
 
-/// Groups of level 0 are sorted by fold code and material; of higher levels they follow the cells.
-PackedLevel pack_level(const Hierarchy& hierarchy, std::size_t index);
+/// `finer` is the level below, already packed; null for level 0.
+PackedLevel pack_level(const Hierarchy& hierarchy, std::size_t index, const PackedLevel* finer);
 
 }  // namespace kerf::cpu
