@@ -87,10 +87,12 @@ Vec solve(const Quadric& q, Vec x, unsigned free) {
   return x;
 }
 
-/// The least energy over the faces, edges and corners of the cube.
+/// The least energy over the faces, edges and corners of the cube; of places that fit alike, such
+/// as the two ends of an edge that runs through the cube, the nearest to the mean.
 Vec solve_on_boundary(const Quadric& q) {
+  const double tie = 1e-12 * q.largest;  // rounding of energies, with room
   Vec best = q.mean;
-  double least = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity(), nearest = least;
   for (int part = 1; part < 27; ++part) {  // per axis: free, at the low side, at the high side
     const int state[3] = {part % 3, part / 3 % 3, part / 9};
     unsigned free = 0;
@@ -100,9 +102,11 @@ Vec solve_on_boundary(const Quadric& q) {
       if (state[d] != 0) x[d] = state[d] == 1 ? -kHalf : kHalf;
     }
     x = solve(q, x, free);
-    const double energy = q.energy(x);
-    if (!in_cube(x) || !(energy < least)) continue;
+    const double energy = q.energy(x), distance = (x - q.mean).squaredNorm();
+    if (!in_cube(x) || !(energy < least + tie)) continue;
+    if (energy > least - tie && distance >= nearest) continue;
     least = energy;
+    nearest = distance;
     best = x;
   }
   return best;
