@@ -184,9 +184,27 @@ TEST_P(BackendSurface, NormalsAreSumsOfFacesByAreaForEachCutIdAndSide) {
   EXPECT_EQ(seen.size(), sums.size());  // one normal for each group at each point
 }
 
-// Normals of a planar cut are those of the plane, at its rim too, whatever the own surface does.
-TEST(SurfaceNormals, OfAPlanarCutAreThoseOfThePlaneAlsoAtItsRim) {
+/// How many corners of cut triangles have the normal `normal`, and how many its opposite; none may
+/// have another. Where a cut ends at a single link, triangles without area have no normal at rest.
+std::array<std::size_t, 2> along_and_against(const SurfaceMesh& mesh, double h,
+                                             const Vec3d& normal) {
+  const double collapsed = 1e-6 * h * h;
   constexpr double kFloat = 1e-5;  // records are floats, over faces of a hundredth of a cell's
+  std::array<std::size_t, 2> count{0, 0};
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.cut_id[t] != 1 || norm(test::face_of(mesh, mesh.triangles[t])) < collapsed) continue;
+    for (const std::int32_t n : mesh.normal_of[t]) {
+      const Vec3d& found = mesh.normals[static_cast<std::size_t>(n)];
+      const double sign = dot(found, normal) > 0 ? 1 : -1;
+      EXPECT_LT(norm(found - sign * normal), kFloat) << "triangle " << t;
+      ++count[sign > 0 ? 0 : 1];
+    }
+  }
+  return count;
+}
+
+// Whatever the own surface does beside it.
+TEST(SurfaceNormals, OfAPlanarCutAreThoseOfThePlaneAlsoAtItsRim) {
   const Vec3d normal = (1 / norm(Vec3d{1, 0.4, -0.3})) * Vec3d{1, 0.4, -0.3};
   LinkedOctree body(test::box_body({11, 10, 9}), 1);
   test::cut_plane(body, {5.3, 4.8, 4.6}, normal, 30);
@@ -194,20 +212,25 @@ TEST(SurfaceNormals, OfAPlanarCutAreThoseOfThePlaneAlsoAtItsRim) {
 
   m.move([](std::int32_t, const Vec3d&) { return Vec3d{}; });
 
-  const SurfaceMesh mesh = m.mesh();
-  std::size_t up = 0, down = 0;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (mesh.cut_id[t] != 1) continue;
-    for (const std::int32_t n : mesh.normal_of[t]) {
-      const double along = dot(mesh.normals[static_cast<std::size_t>(n)], normal);
-      ASSERT_NEAR(std::abs(along), 1, kFloat * kFloat);
-      ASSERT_LT(norm(mesh.normals[static_cast<std::size_t>(n)] - (along > 0 ? 1 : -1) * normal),
-                kFloat);
-      ++(along > 0 ? up : down);
-    }
-  }
+  const auto [up, down] = along_and_against(m.mesh(), m.problem.physics.spacing, normal);
   EXPECT_GT(up, 300u);
   EXPECT_GT(down, 300u);
+}
+
+// At the tip both sides share points, but not their normals.
+TEST(SurfaceNormals, OfAPlanarCrackAreThoseOfThePlaneAlsoAtItsTip) {
+  const Vec3d normal = (1 / norm(Vec3d{0.2, 0.3, 1})) * Vec3d{0.2, 0.3, 1};
+  for (const SurfaceMethod method : test::kMethods) {
+    LinkedOctree body(test::box_body({14, 14, 14}), 1);
+    test::cut_plane(body, {7.2, 6.9, 7.1}, normal, 4.3);
+    Moved m(std::move(body), method, "cpu");
+
+    m.move([](std::int32_t, const Vec3d&) { return Vec3d{}; });
+
+    const auto [up, down] = along_and_against(m.mesh(), m.problem.physics.spacing, normal);
+    EXPECT_GT(up, 300u);
+    EXPECT_EQ(up, down);
+  }
 }
 
 TEST(SurfaceNormals, OfCollapsedTrianglesAreUnitToo) {
@@ -219,9 +242,21 @@ TEST(SurfaceNormals, OfCollapsedTrianglesAreUnitToo) {
     for (const Vec3d& n : m.normals) ASSERT_NEAR(norm(n), 1, 1e-12);
     m.move([](std::int32_t, const Vec3d& x) { return Vec3d{0, -x.y, -x.z}; });
     for (const Vec3d& n : m.normals) ASSERT_NEAR(norm(n), 1, 1e-12);
-    // So small that squares of areas underflow.
-    m.move([](std::int32_t, const Vec3d& x) { return (1e-120 - 1) * x; });
-    for (const Vec3d& n : m.normals) ASSERT_NEAR(norm(n), 1, 1e-12);
+  }
+}
+
+TEST(SurfaceNormals, DoNotDependOnTheUnitOfLength) {
+  constexpr double kRounding = 1e-9;            // products of scaled numbers round elsewhere
+  for (const double scale : {1e-120, 1e120}) {  // squares of areas under- and overflow
+    Moved m(test::scene("octree2"), SurfaceMethod::dual_contouring, "cpu");
+    m.move([](std::int32_t, const Vec3d&) { return Vec3d{}; });
+    const std::vector<Vec3d> expected = m.normals;
+    for (Vec3d& x : m.positions) x *= scale;
+
+    m.backend->surface_normals(m.surface.view(), m.positions, m.normals);
+
+    for (std::size_t n = 0; n < expected.size(); ++n)
+      ASSERT_LT(norm(m.normals[n] - expected[n]), kRounding);
   }
 }
 
