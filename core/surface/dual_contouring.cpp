@@ -349,7 +349,8 @@ void DualContouring::add_patch(LinkKey link, const Vec3i& lower, int axis, int e
   const std::uint64_t number = 2 * link + static_cast<std::uint64_t>(end);
   std::size_t count = 0;
   const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c) {
-    patch.triangle[count] = store_->add_triangle({a, b, c}, group, kMostTriangles * number + count);
+    patch.triangle[count] = store_->add_triangle({a, b, c}, group, outward_normal(o.side),
+                                                 kMostTriangles * number + count);
     ++count;
   };
   if (!o.fan) {

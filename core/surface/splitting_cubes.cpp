@@ -176,9 +176,9 @@ void SplittingCubes::add_fan(GridKey key, const DualCell& cell, int sheet, Sheet
   const auto add = [&](std::int32_t a, std::int32_t b, int corner) {
     const int octant = corner / 3, axis = corner % 3;
     const LinkCut* cut = body_->record(octant_cell(p, octant & ~(1 << axis)), axis);
-    const std::int32_t group =
-        smoothing_group(link_side(*cut, axis, octant >> axis & 1, lattice.spacing));
-    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, group,
+    const LinkSide side = link_side(*cut, axis, octant >> axis & 1, lattice.spacing);
+    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, smoothing_group(side),
+                                                 outward_normal(side),
                                                  kMostTriangles * number + out.triangles.size()));
   };
   int corner = pattern.first[s];

@@ -39,6 +39,28 @@ SimulationSetup block(SurfaceMethod method, int refinement = 1) {
   return setup;
 }
 
+TEST(SimulationSurface, BoxKeepsTheNormalsOfItsFacesAtEdgesAndCorners) {
+  constexpr double kFloat = 1e-6;  // records are floats
+  SimulationSetup setup = block(SurfaceMethod::dual_contouring);
+  setup.body.resolution = 8;
+  setup.cuts.clear();
+
+  const SurfaceMesh mesh = Simulation(setup, test::cpu()).surface_mesh();
+
+  std::vector<std::set<std::int32_t>> normals(mesh.reference.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      normals[static_cast<std::size_t>(mesh.triangles[t][k])].insert(mesh.normal_of[t][k]);
+  std::map<std::size_t, std::size_t> points;  // by their number of normals
+  for (const auto& of_point : normals) ++points[of_point.size()];
+  for (const Vec3d& n : mesh.normals)
+    EXPECT_NEAR(std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)}), 1, kFloat);
+  // 8 x 8 x 4 cells: a grid point each, 8 corners, 4 (7 + 7 + 3) on edges.
+  EXPECT_EQ(points[3], 8u);
+  EXPECT_EQ(points[2], 68u);
+  EXPECT_EQ(points[1], mesh.reference.size() - 76);
+}
+
 TEST(SimulationSurface, LeavesTheStateAsItIsWithoutOne) {
   for (const TimeMode mode : {TimeMode::dynamic, TimeMode::statics}) {
     std::vector<std::uint64_t> hashes;
