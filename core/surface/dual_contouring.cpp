@@ -245,17 +245,19 @@ void DualContouring::place_mids(GridKey edge) {
   if (any) mids_.emplace(edge, mids);
 }
 
-/// Half-way between the surface points at the two ends of the arc from ring place `from` to `to`.
+/// In the face of four cells around the edge: the place that fits the surface points at the two
+/// ends of the arc from ring place `from` to `to`; half-way between them if they lie in one plane.
 std::int32_t DualContouring::add_mid(GridKey edge, int arc, int from, int to) {
   const Lattice& lattice = body_->lattice();
   const int axis = static_cast<int>(edge % 3);
   const Vec3i p = key_point(lattice, edge / 3);
   const std::array<int, 4> ring = dual_face(axis, 1);
-  const SurfaceHit first =
-      corner_hit(*body_, p, dual_corner(ring[from], dual_face_axis(axis, (from + 3) % 4)));
-  const SurfaceHit last =
-      corner_hit(*body_, p, dual_corner(ring[to % 4], dual_face_axis(axis, to % 4)));
-  const Vec3d x = 0.5 * (first.point + last.point);
+  SurfaceHit hits[2] = {
+      corner_hit(*body_, p, dual_corner(ring[from], dual_face_axis(axis, (from + 3) % 4))),
+      corner_hit(*body_, p, dual_corner(ring[to % 4], dual_face_axis(axis, to % 4)))};
+  for (SurfaceHit& hit : hits) hit.point[axis] = hit.normal[axis] = 0;
+  Vec3d x = fit_vertex(hits);
+  x[axis] = 0.5;
   unsigned octants = 0;
   for (int k = from; k <= to; ++k) octants |= 1u << ring[k % 4];
   return store_->add_vertex(
@@ -347,7 +349,8 @@ void DualContouring::add_patch(LinkKey link, const Vec3i& lower, int axis, int e
   const std::uint64_t number = 2 * link + static_cast<std::uint64_t>(end);
   std::size_t count = 0;
   const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c) {
-    patch.triangle[count] = store_->add_triangle({a, b, c}, group, kMostTriangles * number + count);
+    patch.triangle[count] = store_->add_triangle({a, b, c}, group, outward_normal(o.side),
+                                                 kMostTriangles * number + count);
     ++count;
   };
   if (!o.fan) {

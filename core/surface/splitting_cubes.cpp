@@ -106,8 +106,8 @@ void SplittingCubes::place_ends(LinkKey link) {
   }
 }
 
-/// Where a cut ends in a face with one disconnected link: half a cell from the link, in the plane
-/// of its normal.
+/// Where a cut ends in a face with one disconnected link: in the plane of its normal, half a cell
+/// from the link unless the plane leaves the face before.
 void SplittingCubes::place_tip(GridKey edge) {
   const Lattice& lattice = body_->lattice();
   const int axis = static_cast<int>(edge % 3);
@@ -129,11 +129,16 @@ void SplittingCubes::place_tip(GridKey edge) {
   }
   const int along = dual_face_axis(axis, at), across = 3 - axis - along;
   const SurfaceHit hit = corner_hit(*body_, p, dual_corner(ring[at], along));
+  // To the middle of the face, or as far as the plane stays in it.
   Vec3d x = hit.point;
-  const double step = -x[across];  // to the middle of the face
-  x[across] = 0;
-  if (hit.normal[along] != 0)
-    x[along] = std::clamp(x[along] - step * hit.normal[across] / hit.normal[along], -0.5, 0.5);
+  const double step = -x[across];
+  if (hit.normal[along] != 0) {
+    const double rise = -step * hit.normal[across] / hit.normal[along];
+    const double room = rise > 0 ? 0.5 - x[along] : 0.5 + x[along];
+    const double part = std::abs(rise) > room ? room / std::abs(rise) : 1;
+    x[across] += part * step;
+    x[along] += part * rise;
+  }
   unsigned octants = 0;
   for (const int o : ring) octants |= 1u << o;
   const TriangleStore::Vertex vertex{lattice.point(p) + lattice.spacing * x,
@@ -171,9 +176,9 @@ void SplittingCubes::add_fan(GridKey key, const DualCell& cell, int sheet, Sheet
   const auto add = [&](std::int32_t a, std::int32_t b, int corner) {
     const int octant = corner / 3, axis = corner % 3;
     const LinkCut* cut = body_->record(octant_cell(p, octant & ~(1 << axis)), axis);
-    const std::int32_t group =
-        smoothing_group(link_side(*cut, axis, octant >> axis & 1, lattice.spacing));
-    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, group,
+    const LinkSide side = link_side(*cut, axis, octant >> axis & 1, lattice.spacing);
+    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, smoothing_group(side),
+                                                 outward_normal(side),
                                                  kMostTriangles * number + out.triangles.size()));
   };
   int corner = pattern.first[s];

@@ -47,5 +47,11 @@ std::vector<GridKey> edges_around(const Lattice& lattice, std::span<const GridKe
 inline std::int32_t smoothing_group(const LinkSide& side) {
   return 2 * side.cut_id + (side.facing ? 1 : 0);
 }
+/// The normal of a side of a link, out of the material.
+inline Vec3f outward_normal(const LinkSide& side) {
+  const double sign = side.facing ? 1 : -1;
+  return {static_cast<float>(sign * side.normal.x), static_cast<float>(sign * side.normal.y),
+          static_cast<float>(sign * side.normal.z)};
+}
 
 }  // namespace kerf

@@ -15,7 +15,8 @@ namespace kerf {
 /// two sides of a cut lie at one place at rest and share no point, except along the cut's tip.
 ///
 /// Points are shared by all triangles around them; normals are not: a point has one normal for each
-/// cut id around it, and two at the tip of a cut. So cuts are smooth and their edges sharp.
+/// cut id around it, two at the tip of a cut, and more at an edge of the object. So surfaces are
+/// smooth and their edges sharp.
 struct SurfaceMesh {
   std::vector<Vec3d> reference;     ///< per point: position at rest, m
   std::vector<Vec3d> displacement;  ///< per point, m

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/surface/triangle_store.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include "core/base/error.hpp"
@@ -64,17 +65,20 @@ void TriangleStore::mark(std::int32_t v) {
 }
 
 std::int32_t TriangleStore::add_triangle(const std::array<std::int32_t, 3>& vertices,
-                                         std::int32_t group_of_all, std::uint64_t place) {
+                                         std::int32_t group_of_all, const Vec3f& normal,
+                                         std::uint64_t place) {
   const std::int32_t t = take(free_triangles_, triangles.size());
   if (static_cast<std::size_t>(t) == triangles.size()) {
     triangles.emplace_back();
     group.push_back(0);
+    true_normal.emplace_back();
     order.push_back(0);
     next_corner.resize(next_corner.size() + 3, -1);
     normal_of.resize(normal_of.size() + 3, -1);
   }
   triangles[t] = vertices;
   group[t] = group_of_all;
+  true_normal[t] = normal;
   order[t] = place;
   for (int k = 0; k < 3; ++k) {
     const std::int32_t corner = 3 * t + k, v = vertices[static_cast<std::size_t>(k)];
@@ -99,28 +103,59 @@ void TriangleStore::remove_triangle(std::int32_t t) {
   free_triangles_.push_back(t);
 }
 
+/// Brings the corners of a vertex into the order of the list, and their smooth parts to around_.
+void TriangleStore::part_at_creases(std::int32_t v) {
+  constexpr float kCrease =
+      0.64F;  // cosine of 50 degrees: an edge of the object, not its curvature
+  around_.clear();
+  for (std::int32_t c = first_corner[v]; c >= 0; c = next_corner[c]) around_.push_back({c, 0});
+  std::sort(around_.begin(), around_.end(),
+            [&](const Around& a, const Around& b) { return comes_before(a.corner, b.corner); });
+  parts_.clear();  // the first triangle of each
+  std::size_t of_group = 0;
+  for (Around& a : around_) {
+    const std::int32_t t = a.corner / 3;
+    if (!parts_.empty() && group[t] != group[parts_.back()]) of_group = parts_.size();
+    std::size_t part = of_group;
+    while (part < parts_.size() && !(dot(true_normal[parts_[part]], true_normal[t]) > kCrease))
+      ++part;
+    if (part == parts_.size()) parts_.push_back(t);
+    a.part = static_cast<std::int32_t>(part);
+  }
+  std::stable_sort(around_.begin(), around_.end(),
+                   [](const Around& a, const Around& b) { return a.part < b.part; });
+  std::int32_t* link = &first_corner[v];
+  for (const Around& a : around_) {
+    *link = a.corner;
+    link = &next_corner[a.corner];
+  }
+  *link = -1;
+}
+
+std::int32_t TriangleStore::take_normal(std::int32_t v) {
+  const std::int32_t normal = take(free_normals_, normals_);
+  if (static_cast<std::size_t>(normal) == normals_) {
+    ++normals_;
+    next_normal_.push_back(-1);
+  }
+  next_normal_[normal] = first_normal_[v];
+  first_normal_[v] = normal;
+  return normal;
+}
+
 void TriangleStore::finish() {
-  for (const std::int32_t v : changed_) {
+  for (const std::int32_t v : changed_)
     while (first_normal_[v] >= 0) {
       free_normals_.push_back(first_normal_[v]);
       first_normal_[v] = next_normal_[first_normal_[v]];
     }
-  }
   for (const std::int32_t v : changed_) {
     is_changed_[v] = 0;
-    std::int32_t last_group = -1, normal = -1;
-    for (std::int32_t c = first_corner[v]; c >= 0; c = next_corner[c]) {
-      if (group[c / 3] != last_group) {
-        last_group = group[c / 3];
-        normal = take(free_normals_, normals_);
-        if (static_cast<std::size_t>(normal) == normals_) {
-          ++normals_;
-          next_normal_.push_back(-1);
-        }
-        next_normal_[normal] = first_normal_[v];
-        first_normal_[v] = normal;
-      }
-      normal_of[c] = normal;
+    part_at_creases(v);
+    std::int32_t normal = -1;
+    for (std::size_t i = 0; i < around_.size(); ++i) {
+      if (i == 0 || around_[i].part != around_[i - 1].part) normal = take_normal(v);
+      normal_of[around_[i].corner] = normal;
     }
   }
   changed_.clear();
@@ -129,9 +164,9 @@ void TriangleStore::finish() {
 std::size_t TriangleStore::bytes() const {
   const auto of = [](const auto& array) { return array.capacity() * sizeof(array[0]); };
   return of(reference) + of(finest_cell) + of(vertex_key) + of(first_corner) + of(triangles) +
-         of(group) + of(order) + of(next_corner) + of(normal_of) + of(used) + of(first_normal_) +
-         of(next_normal_) + of(free_vertices_) + of(free_triangles_) + of(free_normals_) +
-         of(changed_) + of(is_changed_);
+         of(group) + of(true_normal) + of(order) + of(next_corner) + of(normal_of) + of(used) +
+         of(first_normal_) + of(next_normal_) + of(free_vertices_) + of(free_triangles_) +
+         of(free_normals_) + of(changed_) + of(is_changed_);
 }
 
 }  // namespace kerf

@@ -37,10 +37,11 @@ class TriangleStore {
   /// Needs  v has no triangles.
   void remove_vertex(std::int32_t v);
 
-  /// `group` tells which triangles around a vertex share a normal: 2 cut_id + facing.
+  /// `group` tells which triangles around a vertex may share a normal: 2 cut_id + facing. They do
+  /// if their surfaces, whose outward normal there is `true_normal`, bend by less than a crease.
   /// `order` names the triangle among all of a surface, for ever.
   std::int32_t add_triangle(const std::array<std::int32_t, 3>& vertices, std::int32_t group,
-                            std::uint64_t order);
+                            const Vec3f& true_normal, std::uint64_t order);
   void remove_triangle(std::int32_t t);
 
   /// Hands out normals to the vertices whose triangles changed since the last call.
@@ -62,6 +63,7 @@ class TriangleStore {
   // Per triangle.
   std::vector<std::array<std::int32_t, 3>> triangles;
   std::vector<std::int32_t> group;
+  std::vector<Vec3f> true_normal;  ///< unit, outward, of the surface that the triangle stands for
   std::vector<std::uint64_t> order;
   // Per corner of a triangle.
   std::vector<std::int32_t> next_corner;
@@ -70,6 +72,8 @@ class TriangleStore {
  private:
   bool comes_before(std::int32_t a, std::int32_t b) const;
   void mark(std::int32_t v);
+  void part_at_creases(std::int32_t v);
+  std::int32_t take_normal(std::int32_t v);
 
   std::vector<std::int32_t> first_normal_;  // per vertex; a list through next_normal_
   std::vector<std::int32_t> next_normal_;   // per normal
@@ -77,6 +81,12 @@ class TriangleStore {
   std::vector<std::int32_t> free_vertices_, free_triangles_, free_normals_;
   std::vector<std::int32_t> changed_;
   std::vector<std::uint8_t> is_changed_;
+  /// Of the vertex at hand: its corners, and the smooth part of its group that each belongs to.
+  struct Around {
+    std::int32_t corner, part;
+  };
+  std::vector<Around> around_;
+  std::vector<std::int32_t> parts_;
 };
 
 }  // namespace kerf

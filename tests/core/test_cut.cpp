@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -323,8 +325,60 @@ TEST(Cut, RepeatedCutChangesNothing) {
 
   EXPECT_EQ(second.links_hit, first.links_hit);
   EXPECT_TRUE(second.disconnected.empty());
+  EXPECT_TRUE(second.moved.empty());
   EXPECT_FALSE(second.changed());
   expect_same_cuts(once, twice);
+}
+
+/// Links that were cut before, and whose record at some end is now another one.
+std::vector<LinkKey> changed_records(const LinkedOctree& before, const LinkedOctree& after) {
+  std::set<LinkKey> keys;
+  for (const LinkKey key : cut_links(before))
+    for (int end = 0; end < 2; ++end)
+      if (before.records().at(key).end[end].distance != after.records().at(key).end[end].distance)
+        keys.insert(key);
+  return {keys.begin(), keys.end()};
+}
+
+TEST(Cut, TellsWhichLinksItOnlyPassesNearer) {
+  const Voxels voxels = ball_body(20);
+  for (const int refinement : {0, 2}) {
+    LinkedOctree body(voxels, refinement);
+    const auto plane = [&](double x, const Vec3d& normal) {
+      return plane_blade(at(voxels.lattice, x, 10, 10), normal, 2);
+    };
+    cut(body, {}, plane(9.9, {1, 0, 0}), 1);
+
+    // Through half of the links nearer to one end, through the others nearer to the other, and
+    // through links along y and z that were connected.
+    const LinkedOctree before = body;
+    const CutEvent tilted = cut(body, {}, plane(9.9, {1, 0.05, 0.01}), 2);
+    EXPECT_FALSE(tilted.moved.empty());
+    EXPECT_FALSE(tilted.disconnected.empty());
+    EXPECT_EQ(tilted.moved, changed_records(before, body));
+    EXPECT_LE(tilted.moved.size() + tilted.disconnected.size(), tilted.links_hit);
+    std::vector<LinkKey> both;
+    std::set_intersection(tilted.moved.begin(), tilted.moved.end(), tilted.disconnected.begin(),
+                          tilted.disconnected.end(), std::back_inserter(both));
+    EXPECT_TRUE(both.empty());
+  }
+}
+
+TEST(Cut, BetweenTwoCutsMovesNothing) {
+  LinkedOctree body(box_body({8, 8, 8}), 1);
+  const auto plane = [&](double x) {
+    return plane_blade(at(body.lattice(), x, 4, 4), {1, 0, 0}, 1);
+  };
+  cut(body, {}, plane(3.6), 1);
+
+  // The first leaves the high ends to the second; what passes between them is nearer to neither.
+  const CutEvent second = cut(body, {}, plane(4.3), 2), third = cut(body, {}, plane(3.9), 3);
+
+  EXPECT_EQ(second.moved.size(), 64u);
+  EXPECT_TRUE(second.disconnected.empty());
+  EXPECT_FALSE(second.changed());
+  EXPECT_EQ(third.links_hit, 64u);
+  EXPECT_TRUE(third.moved.empty());
 }
 
 TEST(Cut, FourStampsPunchFourPieces) {

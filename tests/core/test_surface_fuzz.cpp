@@ -8,10 +8,9 @@
 
 #include "core/body/cut.hpp"
 #include "core/body/pieces.hpp"
-#include "core/surface/surface.hpp"
 #include "tests/support/bodies.hpp"
 #include "tests/support/random_blades.hpp"
-#include "tests/support/surface_checks.hpp"
+#include "tests/support/surface_cases.hpp"
 
 namespace kerf {
 namespace {
@@ -23,13 +22,6 @@ using test::random_body;
 constexpr int kBladesPerBody = 8;
 constexpr std::uint64_t kFirstSeed = 20150900;
 
-/// The mesh at rest, with numbers for normals that say which is which.
-SurfaceMesh mesh_at_rest(const Surface& surface, const LinkedOctree& body) {
-  std::vector<Vec3d> normals(surface.view().normals);
-  for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = {1, 0, 0};
-  return surface.mesh(surface.store().reference, normals, label_pieces(body, nullptr));
-}
-
 /// A surface that was brought up to date is the one built anew, to the last bit.
 void expect_same_mesh(const SurfaceMesh& a, const SurfaceMesh& b) {
   EXPECT_EQ(a.reference, b.reference);
@@ -37,17 +29,6 @@ void expect_same_mesh(const SurfaceMesh& a, const SurfaceMesh& b) {
   EXPECT_EQ(a.normal_of, b.normal_of);
   EXPECT_EQ(a.cut_id, b.cut_id);
   EXPECT_EQ(a.piece, b.piece);
-}
-
-/// Points belong to the piece of the cell they move with; so triangles must lie within one piece.
-void expect_pieces_apart(const SurfaceMesh& mesh, std::size_t pieces) {
-  std::vector<char> seen(pieces, 0);
-  for (const auto& t : mesh.triangles) {
-    const std::int32_t piece = mesh.piece[static_cast<std::size_t>(t[0])];
-    seen[static_cast<std::size_t>(piece)] = 1;
-    for (const std::int32_t v : t) ASSERT_EQ(mesh.piece[static_cast<std::size_t>(v)], piece);
-  }
-  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), static_cast<std::ptrdiff_t>(pieces));
 }
 
 void cut_one_body(std::uint64_t seed, int blades, SurfaceMethod method) {
@@ -62,15 +43,15 @@ void cut_one_body(std::uint64_t seed, int blades, SurfaceMethod method) {
     const CutEvent event = cut(body, {}, random.next(), i + 1);
     surface.update(body, event);
     surface.bind(body);
-    const SurfaceMesh mesh = mesh_at_rest(surface, body);
+    const SurfaceMesh mesh = test::mesh_at_rest(surface, body);
 
     EXPECT_TRUE(test::is_manifold(mesh));
     std::size_t pieces = 0;
     label_pieces(body, &pieces);
-    expect_pieces_apart(mesh, pieces);
+    EXPECT_TRUE(test::pieces_are_apart(mesh, pieces));
     Surface anew(body, method);
     anew.bind(body);
-    expect_same_mesh(mesh, mesh_at_rest(anew, body));
+    expect_same_mesh(mesh, test::mesh_at_rest(anew, body));
     if (::testing::Test::HasFailure()) return;
   }
 }
@@ -88,10 +69,7 @@ TEST_P(SurfaceFuzz, RandomBladesLeaveAManifoldThatIsAsBuiltAnew) {
 INSTANTIATE_TEST_SUITE_P(Methods, SurfaceFuzz,
                          ::testing::Values(SurfaceMethod::dual_contouring,
                                            SurfaceMethod::splitting_cubes),
-                         [](const auto& method) {
-                           return method.param == SurfaceMethod::dual_contouring ? "DualContouring"
-                                                                                 : "SplittingCubes";
-                         });
+                         [](const auto& method) { return test::method_name(method.param); });
 
 }  // namespace
 }  // namespace kerf
