@@ -19,10 +19,11 @@ constexpr double kPanelWidth = 220, kPanelHeight = 170;
 constexpr double kLeft = 62, kTop = 30, kGap = 16, kTitle = 22, kLegend = 190;
 constexpr double kMarker = 4;
 
-// Told apart also by eyes that mix up red and green. Source  Okabe, Ito 2008.
+// The first eight are told apart also by eyes that mix up red and green. Source  Okabe, Ito 2008.
 constexpr const char* kColours[] = {"#0072b2", "#e69f00", "#009e73", "#cc79a7",
-                                    "#d55e00", "#56b4e9", "#000000", "#a09000"};
-constexpr int kColourCount = 8;
+                                    "#d55e00", "#56b4e9", "#000000", "#a09000",
+                                    "#7f7f7f", "#8c564b", "#6a3d9a", "#b2df8a"};
+constexpr int kColourCount = 12;
 constexpr int kShapeCount = 6;
 
 /// Each value once, in the order in which they come.
