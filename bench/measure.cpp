@@ -85,6 +85,7 @@ class SceneRun {
   std::vector<Row> run() {
     std::string missing;
     listener_.progress(scene_ + ": building");
+    release_free_memory();
     auto setup = make_scene(scene_, options_.size, mesh_folders(options_.meshes), missing);
     if (!setup) {
       listener_.note(text("skipped ", scene_, ": there is no ", missing,
@@ -97,7 +98,7 @@ class SceneRun {
     body_->build();
     open_seats();
     for (const Phase& phase : phases())
-      if (wanted(phase)) measure(phase);
+      if (wanted(phase) && has_levels(phase)) measure(phase);
     return std::move(rows_);
   }
 
@@ -106,6 +107,7 @@ class SceneRun {
   bool memory_suffices() const;
   void open_seats();
   bool wanted(const Phase& phase) const;
+  bool has_levels(const Phase& phase) const;
   void measure(const Phase& phase);
   std::vector<Entrant> entrants_of(const Phase& phase);
   void run_once(const Phase& phase, Entrant& entrant);
@@ -143,12 +145,15 @@ void SceneRun::list_seats() {
   }
 }
 
-// Measured on the CPU backend in double: some 900 bytes a cell for the structure, shared, and 2000
-// for the values of each machine; a cut holds a second structure for a while.
+// Measured on the CPU backend in double: 1500 bytes a cell for a body and one backend at an
+// operator, 1900 at a solve, 2200 at a cut, which holds a second structure for a while.
 bool SceneRun::memory_suffices() const {
-  constexpr double kStructure = 900, kValues = 2000;
-  const double bytes = static_cast<double>(body_->cells()) *
-                       (2 * kStructure + kValues * static_cast<double>(seats_.size()));
+  constexpr double kShared = 1100, kSecondStructure = 900, kValues = 1600;
+  bool reloads = false;
+  for (const Phase& phase : phases()) reloads = reloads || (phase.reloads && wanted(phase));
+  const double bytes =
+      static_cast<double>(body_->cells()) *
+      (kShared + (reloads ? kSecondStructure : 0) + kValues * static_cast<double>(seats_.size()));
   const double available = physical_memory();
   if (bytes < 0.9 * available) return true;
   listener_.note(text("skipped ", scene_, ": its ", body_->cells(), " cells with ", seats_.size(),
@@ -196,6 +201,10 @@ bool SceneRun::wanted(const Phase& phase) const {
   if (std::find(names.begin(), names.end(), phase.name) == names.end()) return false;
   for (const SceneInfo& info : scenes())
     if (scene_ == info.name && info.solve_only && std::string(phase.name) != "solve") return false;
+  return true;
+}
+
+bool SceneRun::has_levels(const Phase& phase) const {
   if (phase.levels <= static_cast<int>(body_->hierarchy().levels.size())) return true;
   listener_.note(text("skipped ", phase.name, " of ", scene_, ": the body has one level only"));
   return false;
@@ -238,6 +247,7 @@ void SceneRun::measure(const Phase& phase) {
   for (const Entrant& entrant : entrants)
     if (!entrant.gave_up) add_row(phase, entrant);
   for (Entrant& entrant : entrants) entrant.trial->drop();
+  release_free_memory();
   if (!phase.reloads) return;
   for (Entrant& entrant : entrants) {
     entrant.trial->machine.load();

@@ -9,7 +9,18 @@
 #include <fstream>
 #include <string>
 
+#if defined(__linux__)
+#include <malloc.h>
+#endif
+
 namespace kerf::bench {
+
+/// Gives what was freed back to the system; else it would count as held.
+inline void release_free_memory() {
+#if defined(__GLIBC__)
+  malloc_trim(0);
+#endif
+}
 
 /// Where the system does not let a process do so, the peak is that of its whole life.
 inline void reset_memory_peak() { std::ofstream("/proc/self/clear_refs") << 5; }
