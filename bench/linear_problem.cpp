@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "bench/noise.hpp"
 #include "core/base/error.hpp"
 #include "core/base/timer.hpp"
 #include "core/body/cut.hpp"
@@ -10,19 +11,6 @@
 #include "cpu/cpu_backend.hpp"
 
 namespace kerf::bench {
-namespace {
-
-std::vector<double> noise(std::size_t size) {
-  std::vector<double> out(size);
-  std::uint64_t state = 1;
-  for (double& value : out) {
-    state = state * 6364136223846793005U + 1442695040888963407U;
-    value = static_cast<double>(state >> 11) * 0x1p-52 - 1;
-  }
-  return out;
-}
-
-}  // namespace
 
 LinearProblem::LinearProblem(const ProblemSetup& setup) : setup_(setup) {
   const Box3 cube{{0, 0, 0}, {1, 1, 1}};

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+//
+// The table of results, as a file. Columns: bench/README.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace kerf::bench {
+
+/// A number that a row does not have is no number, and an empty field of the file.
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+struct Row {
+  std::string scene, backend;
+  int threads = 1;
+  std::string precision;
+  double cells = 0, vertices = kNone;
+  int levels = 0;  ///< 0: none
+  std::string phase;
+  double ms_min = 0, ms_median = 0;
+  double ns_per_cell = 0;   ///< of the fastest run
+  double gb_per_s = kNone;  ///< counted bytes over the fastest run; GFLOP/s of fma-*
+  double residual = kNone;
+  std::string state_hash;
+  double of_ceiling = kNone;  ///< least time by the ceilings over that of the fastest run
+  double peak_bytes = kNone;
+};
+
+/// What all rows of a run share.
+struct Origin {
+  std::string commit, build, machine;
+};
+
+/// @throws Error (bad_input) if the file cannot be written.
+void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
+               const Origin& origin);
+
+/// The rows of a file that write_csv made, or that has at least the columns of a plot.
+/// @throws Error (bad_input) that names the file and the line.
+std::vector<Row> read_csv(const std::filesystem::path& file);
+
+}  // namespace kerf::bench

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include <unistd.h>
+
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <new>
+#include <set>
+
+#include "app/commands.hpp"
+#include "app/version.hpp"
+#include "bench/machine_name.hpp"
+#include "bench/measure.hpp"
+#include "bench/options.hpp"
+#include "bench/plot.hpp"
+#include "core/base/error.hpp"
+
+namespace {
+
+using namespace kerf;
+using namespace kerf::bench;
+
+/// The table on standard output; on a terminal, a line on standard error that says what runs.
+class Console {
+ public:
+  Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
+  ~Console() { clear(); }
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  void head() {
+    std::printf("%-16s %-19s %-10s %7s %-9s %10s %10s %11s %8s %7s %9s\n", "scene", "phase",
+                "backend", "threads", "precision", "ms_min", "ms_median", "ns_per_cell", "gb_per_s",
+                "of_ceil", "residual");
+  }
+  void row(const Row& r) {
+    clear();
+    std::printf("%-16s %-19s %-10s %7d %-9s %10.4g %10.4g %11.4g %8s %7s %9s\n", r.scene.c_str(),
+                r.phase.c_str(), r.backend.c_str(), r.threads, r.precision.c_str(), r.ms_min,
+                r.ms_median, r.ns_per_cell, number("%.3g", r.gb_per_s).c_str(),
+                number("%.2g", r.of_ceiling).c_str(), number("%.2g", r.residual).c_str());
+    std::fflush(stdout);
+  }
+  void note(const std::string& line) {
+    if (!notes_.insert(line).second) return;  // each once
+    clear();
+    std::fprintf(stderr, "kerf_bench: %s\n", line.c_str());
+  }
+  void progress(const std::string& line) {
+    if (!terminal_) return;
+    constexpr int kWidth = 79;
+    std::fprintf(stderr, "\r%.*s\033[K", kWidth, line.c_str());
+    std::fflush(stderr);
+    shown_ = true;
+  }
+
+ private:
+  static std::string number(const char* format, double value) {
+    if (std::isnan(value)) return "-";
+    char out[32];
+    std::snprintf(out, sizeof out, format, value);
+    return out;
+  }
+  void clear() {
+    if (shown_) std::fprintf(stderr, "\r\033[K");
+    shown_ = false;
+  }
+
+  bool terminal_, shown_ = false;
+  std::set<std::string> notes_;
+};
+
+std::string lower(std::string text_of) {
+  for (char& c : text_of) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text_of;
+}
+
+// Before anything is measured, so that a bad name is not found after an hour, and after each scene,
+// so that a run that is stopped leaves what it has.
+void save(const Options& options, std::vector<Row> all, const std::vector<Row>& rows) {
+  if (options.csv.empty()) return;
+  all.insert(all.end(), rows.begin(), rows.end());
+  write_csv(
+      options.csv, all,
+      {kCommit, lower(kBuildType), options.machine.empty() ? machine_name() : options.machine});
+}
+
+int measure(const Options& options) {
+  Console console;
+  const Listener listener{[&](const Row& row) { console.row(row); },
+                          [&](const std::string& line) { console.note(line); },
+                          [&](const std::string& line) { console.progress(line); }};
+  Ceilings ceilings(options.threads, options.size == Size::small);
+  std::vector<Row> rows;
+  save(options, {}, {});
+  console.head();
+  for (const std::string& scene : options.scenes) {
+    console.progress(scene + ": measuring the machine");
+    ceilings.measure();
+    if (scene == "machine") continue;
+    const std::vector<Row> more = measure_scene(scene, options, ceilings, listener);
+    rows.insert(rows.end(), more.begin(), more.end());
+    save(options, ceiling_rows(ceilings), rows);
+  }
+  const std::vector<Row> machine = ceiling_rows(ceilings);
+  for (const Row& row : machine) console.row(row);
+  save(options, machine, rows);
+  return kDone;
+}
+
+int run(int argc, char** argv) {
+  const Options options = parse_options(argc, argv);
+  if (options.help) {
+    std::fputs(usage().c_str(), stdout);
+  } else if (options.list) {
+    std::fputs(listing().c_str(), stdout);
+  } else if (!options.plot.empty()) {
+    write_plot(read_csv(options.plot), options.svg);
+  } else {
+    return measure(options);
+  }
+  return kDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto complain = [](const char* what, int status) {
+    std::fflush(stdout);
+    std::fprintf(stderr, "kerf_bench: error: %s\n", what);
+    return status;
+  };
+  try {
+    return run(argc, argv);
+  } catch (const Error& error) {
+    const bool bad_input = error.kind() == ErrorKind::bad_input;
+    const bool unavailable = error.kind() == ErrorKind::unavailable;
+    return complain(error.what(), bad_input ? kBadInput : unavailable ? kUnavailable : kInternal);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory; choose a smaller scene or fewer threads at once", kUnavailable);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kInternal);
+  }
+}

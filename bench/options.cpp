@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+#include "bench/options.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <functional>
+#include <iomanip>
+#include <map>
+#include <sstream>
+#include <string_view>
+#include <thread>
+
+#include "app/scene_toml.hpp"
+#include "bench/candidates.hpp"
+#include "bench/phases.hpp"
+#include "core/base/error.hpp"
+
+namespace kerf::bench {
+namespace {
+
+using Names = std::vector<std::string>;
+
+constexpr const char* kAll = "all";
+
+Names split(std::string_view list) {
+  Names out(1);
+  for (const char c : list) {
+    if (c == ',')
+      out.emplace_back();
+    else
+      out.back() += c;
+  }
+  return out;
+}
+
+template <class Table>
+Names names_of(const Table& table) {
+  Names out;
+  for (const auto& entry : table) out.emplace_back(entry.name);
+  return out;
+}
+
+Names scene_names() {
+  Names out = names_of(scenes());
+  out.emplace_back("machine");  // the ceilings alone
+  return out;
+}
+
+std::string unknown(const std::string& kind, const std::string& name, const Names& known) {
+  const std::string near = nearest_name(name, known);
+  if (!near.empty()) return text("no ", kind, " '", name, "'; did you mean '", near, "'?");
+  std::string all;
+  for (const std::string& one : known) all += (all.empty() ? "" : ", ") + one;
+  return text("no ", kind, " '", name, "'; there are: ", all);
+}
+
+// The names of a list, each once, in the order of `known`; all of them for "all".
+Names choose(const std::string& option, const std::string& kind, const std::string& list,
+             const Names& known) {
+  if (list == kAll) return known;
+  const Names given = split(list);
+  for (const std::string& name : given)
+    expects(std::find(known.begin(), known.end(), name) != known.end(),
+            text(option, ": ", unknown(kind, name, known)));
+  Names out;
+  for (const std::string& name : known)
+    if (std::find(given.begin(), given.end(), name) != given.end()) out.push_back(name);
+  return out;
+}
+
+template <class Number>
+Number number(const std::string& option, const std::string& value, Number least, Number most) {
+  Number out{};
+  const char* const end = value.data() + value.size();
+  const auto [stop, error] = std::from_chars(value.data(), end, out);
+  expects(error == std::errc() && stop == end && out >= least && out <= most,
+          text(option, " must be a number from ", least, " to ", most, ", not '", value, "'"));
+  return out;
+}
+
+int cores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+
+// Powers of two below the number of cores, and that number.
+std::vector<int> all_threads() {
+  std::vector<int> out;
+  for (int n = 1; n < cores(); n *= 2) out.push_back(n);
+  out.push_back(cores());
+  return out;
+}
+
+std::vector<int> choose_threads(const std::string& list) {
+  if (list == kAll) return all_threads();
+  std::vector<int> out;
+  for (const std::string& one : split(list)) out.push_back(number("--threads", one, 1, 1024));
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+using Setter = std::function<void(Options&, const std::string&)>;
+
+const std::map<std::string, Setter>& setters() {
+  static const std::map<std::string, Setter> all{
+      {"--scene",
+       [](Options& o, const std::string& v) {
+         o.scenes = choose("--scene", "scene", v, scene_names());
+       }},
+      {"--backend",
+       [](Options& o, const std::string& v) {
+         o.backends = choose("--backend", "backend", v, names_of(candidates()));
+         o.all_backends = v == kAll;
+       }},
+      {"--threads", [](Options& o, const std::string& v) { o.threads = choose_threads(v); }},
+      {"--precision",
+       [](Options& o, const std::string& v) {
+         o.precisions = choose("--precision", "precision", v, {"single", "mixed", "double"});
+         o.all_precisions = v == kAll;
+       }},
+      {"--phase",
+       [](Options& o, const std::string& v) {
+         o.phases = choose("--phase", "phase", v, names_of(phases()));
+       }},
+      {"--repeat",
+       [](Options& o, const std::string& v) { o.repeat = number("--repeat", v, 1, 1000); }},
+      {"--seconds",
+       [](Options& o, const std::string& v) { o.seconds = number("--seconds", v, 0.0, 1e6); }},
+      {"--give-up",
+       [](Options& o, const std::string& v) { o.give_up = number("--give-up", v, 0.0, 1e6); }},
+      {"--size",
+       [](Options& o, const std::string& v) {
+         o.size = choose("--size", "size", v, {"full", "small"}).front() == "small" ? Size::small
+                                                                                    : Size::full;
+       }},
+      {"--csv", [](Options& o, const std::string& v) { o.csv = v; }},
+      {"--meshes", [](Options& o, const std::string& v) { o.meshes = v; }},
+      {"--machine", [](Options& o, const std::string& v) { o.machine = v; }},
+      {"--plot", [](Options& o, const std::string& v) { o.plot = v; }},
+      {"--svg", [](Options& o, const std::string& v) { o.svg = v; }}};
+  return all;
+}
+
+void check(const Options& o) {
+  if (o.list || o.help) return;
+  expects(o.plot.empty() == o.svg.empty(), "--plot FILE.csv and --svg FILE.svg go together");
+  expects(o.scenes.empty() != o.plot.empty(),
+          "give either --scene or --plot; --list names the scenes, --help all options");
+}
+
+}  // namespace
+
+Options parse_options(int argc, const char* const* argv) {
+  Options out;
+  out.threads = {cores()};
+  out.phases = names_of(phases());
+  for (int i = 1; i < argc; ++i) {
+    const std::string name = argv[i];
+    if (name == "--list" || name == "--help" || name == "-h") {
+      (name == "--list" ? out.list : out.help) = true;
+      continue;
+    }
+    const auto setter = setters().find(name);
+    if (setter == setters().end()) {
+      Names known{"--list", "--help"};
+      for (const auto& [option, set] : setters()) known.push_back(option);
+      throw Error(ErrorKind::bad_input, unknown("option", name, known));
+    }
+    expects(i + 1 < argc && argv[i + 1][0] != '\0', name + " needs a value");
+    setter->second(out, argv[++i]);
+  }
+  check(out);
+  return out;
+}
+
+std::string usage() {
+  return "usage: kerf_bench --scene A,B [options]    run and print a table\n"
+         "       kerf_bench --plot FILE.csv --svg FILE.svg\n"
+         "       kerf_bench --list                   scenes, backends, phases\n"
+         "\n"
+         "  --backend LIST     what runs (default: cpu)\n"
+         "  --threads LIST     numbers of threads (default: all cores)\n"
+         "  --precision LIST   single, mixed, double (default: double)\n"
+         "  --phase LIST       what is timed (default: all)\n"
+         "  --repeat N         runs of each after one that warms up (default: 5); short ones more\n"
+         "  --seconds S        no further run of what has taken so long (default: no limit)\n"
+         "  --give-up S        longest run of a solve; beyond, it has no row (default: no limit)\n"
+         "  --size full|small  small: for a quick look and for tests\n"
+         "  --csv FILE         write the table there too\n"
+         "  --meshes DIR       where real meshes are (default: $KERF_MESHES, ../shared/meshes)\n"
+         "  --machine NAME     for the column of that name (default: from the processor)\n"
+         "\n"
+         "A list is names with commas between, or `all`.\n"
+         "Exit status: 0 done; 2 bad input; 4 no such backend or out of memory.\n";
+}
+
+std::string listing() {
+  std::ostringstream out;
+  const auto part = [&](const char* title, const auto& table) {
+    out << title << '\n';
+    for (const auto& entry : table)
+      out << "  " << std::left << std::setw(21) << entry.name << entry.what << '\n';
+  };
+  part("scenes", scenes());
+  out << "  " << std::left << std::setw(21) << "machine"
+      << "no body: the ceilings alone, which every run measures\n";
+  part("backends and baselines", candidates());
+  part("phases", phases());
+  return out.str();
+}
+
+}  // namespace kerf::bench

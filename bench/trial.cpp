@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#include "bench/trial.hpp"
+
+#include "app/backends.hpp"
+
+namespace kerf::bench {
+
+Machine::Machine(const Body& body, const SolverSetup& setup)
+    : body_(body), backend_(make_backend(setup)) {
+  load_vector = backend_->add_vector();
+  bent = backend_->add_vector();
+  solution = backend_->add_vector();
+}
+
+void Machine::load() {
+  backend_->load(body_.hierarchy());
+  backend_->set_operator({});
+  backend_->write(0, load_vector, body_.load());
+  backend_->mask(0, load_vector);
+  if (rotations_before.empty()) {
+    backend_->write(0, bent, body_.bent(0.9));
+    backend_->rotate_cells(bent);
+    rotations_before.resize(4 * body_.cells());
+    backend_->read_rotations(rotations_before);
+  } else {
+    backend_->write_rotations(rotations_before);
+  }
+  backend_->write(0, bent, body_.bent(1));
+  backend_->rotate_cells(bent);
+  backend_->prepare(0);
+  for (int level = 0; level + 1 < levels(); ++level) {
+    backend_->coarsen(level);
+    backend_->prepare(level + 1);
+  }
+  backend_->factor_coarsest();
+}
+
+void Trial::drop() {
+  solver.reset();
+  dense.reset();
+  octree.reset();
+  surface.reset();
+  dense_in = dense_out = {};
+}
+
+void Trial::use_smoother(SmootherType type) {
+  SmootherOptions options;
+  options.chebyshev = type == SmootherType::chebyshev;
+  options.omega = candidate.solver.omega;
+  backend().set_smoother(options);
+}
+
+Cycle Trial::cycle() {
+  const SolverSetup& setup = candidate.solver;
+  CycleOptions options{setup.cycle, setup.pre_sweeps, setup.post_sweeps, !is_paper()};
+  if (options.type == CycleType::automatic)  // as LinearSolver chooses
+    options.type = body.hierarchy().cut ? CycleType::k : CycleType::v;
+  return Cycle(backend(), machine.levels(), options);
+}
+
+std::vector<double> Trial::read(int level, int x) {
+  std::vector<double> out(3 * body.hierarchy().levels[level].point.size());
+  backend().read(level, x, out);
+  return out;
+}
+
+}  // namespace kerf::bench

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include "bench/phases.hpp"
+#include "core/base/error.hpp"
+#include "core/base/timer.hpp"
+#include "core/body/cut.hpp"
+
+namespace kerf::bench {
+namespace {
+
+constexpr double kTolerance = 1e-8;        // of `solve`: true relative residual
+constexpr double kExactTolerance = 1e-10;  // of the solution that errors are measured by
+
+// topology and cut: the backend keeps a pointer to what it loaded, so the last hierarchy may go
+// only when the next one is in place.
+
+void load_built(Trial& t, Hierarchy built) {
+  t.hierarchy = std::make_unique<Hierarchy>(std::move(built));
+  t.backend().load(*t.hierarchy);
+}
+
+void prepare_topology(Trial& t) { t.previous = std::move(t.hierarchy); }
+
+void run_topology(Trial& t) { load_built(t, t.body.build_levels(t.body.octree())); }
+
+Outcome outcome_topology(Trial& t) {
+  Outcome out;
+  out.hash = hash_of(*t.hierarchy);
+  return out;
+}
+
+void prepare_cut(Trial& t) {
+  prepare_topology(t);
+  t.octree = t.body.octree();
+  t.surface = std::make_unique<Surface>(*t.octree, SurfaceMethod::dual_contouring);
+}
+
+void run_cut(Trial& t) {
+  const auto id = static_cast<std::int32_t>(t.body.setup().cuts.size()) + 1;
+  const CutEvent event = cut(*t.octree, t.body.bent_corners(), t.body.blade(), id);
+  ensures(event.changed(), "the blade of the bench meets its body");
+  t.surface->update(*t.octree, event);
+  t.surface->bind(*t.octree);
+  load_built(t, t.body.build_levels(*t.octree));
+}
+
+// solve: values and solution; symbolic work belongs to the topology
+
+void prepare_solve(Trial& t) {
+  if (!t.solver) {
+    t.solver = std::make_unique<LinearSolver>(t.backend(), t.candidate.solver);
+    t.solver->set_structure(t.body.hierarchy());
+  }
+  t.use_smoother(t.candidate.solver.smoother);
+  t.backend().zero(0, t.machine.solution);
+}
+
+void run_solve(Trial& t) {
+  const Timer timer;
+  t.solver->on_progress([&](int, double) {
+    if (t.give_up > 0 && timer.seconds() > t.give_up) throw GaveUp{};
+  });
+  t.solver->refresh();
+  t.stats = t.solver->solve(t.machine.load_vector, t.machine.solution, kTolerance);
+  t.solver->on_progress({});
+}
+
+Outcome outcome_solve(Trial& t) {
+  Outcome out{t.read(0, t.machine.solution)};
+  out.residual = t.stats.residual;
+  return out;
+}
+
+Work work_solve(const Trial& t) {
+  using namespace counts;
+  const auto cycles = static_cast<double>(t.stats.cycles);
+  switch (t.candidate.solver.method) {
+    case SolverMethod::cg:
+      return kCoarsen + kPrepare + cycles * (kCycle + kOperator + kIteration);
+    case SolverMethod::multigrid:
+      return kCoarsenPaper + kPrepare + cycles * (kCyclePaper + kResidual);
+    case SolverMethod::cg_jacobi:
+      return kPrepare + cycles * (kJacobi + kOperator + kIteration);
+    case SolverMethod::cholesky:
+      break;
+  }
+  return {};
+}
+
+// step: the linear part of a time step as [DGW11], table 1, times it; from zero, so that the
+// error falls from 1
+
+void find_exact(Trial& t) {
+  SolverSetup setup;
+  setup.max_cycles = 200;
+  LinearSolver solver(t.backend(), setup);
+  solver.set_structure(t.body.hierarchy());
+  t.backend().zero(0, t.machine.solution);
+  solver.solve(t.machine.load_vector, t.machine.solution, kExactTolerance);
+  t.exact = t.read(0, t.machine.solution);
+}
+
+void prepare_step(Trial& t) {
+  if (t.exact.empty()) find_exact(t);
+  t.use_smoother(t.candidate.solver.smoother);
+  t.backend().write_rotations(t.machine.rotations_before);
+  t.backend().copy(0, t.machine.load_vector, kRight);
+  t.backend().zero(0, kSolution);
+}
+
+void run_step(Trial& t) {
+  Backend& b = t.backend();
+  b.rotate_cells(t.machine.bent);
+  b.prepare(0);
+  for (int level = 0; level + 1 < t.machine.levels(); ++level) {
+    b.coarsen(level);
+    b.prepare(level + 1);
+  }
+  b.factor_coarsest();
+  Cycle cycle = t.cycle();
+  for (int i = 0; i < 3; ++i) cycle.run();
+}
+
+Outcome outcome_step(Trial& t) {
+  Outcome out{t.read(0, kSolution)};
+  double error = 0, size = 0;
+  for (std::size_t i = 0; i < t.exact.size(); ++i) {
+    error += (out.values[i] - t.exact[i]) * (out.values[i] - t.exact[i]);
+    size += t.exact[i] * t.exact[i];
+  }
+  out.residual = std::sqrt(error / size);
+  return out;
+}
+
+}  // namespace
+
+std::vector<Phase> whole_phases() {
+  return {
+      {"topology", "all levels from the octree, and load", prepare_topology, run_topology,
+       outcome_topology, always({}), 1, true},
+      {"cut", "a blade through 1 % of the cells: octree, surface, levels, load", prepare_cut,
+       run_cut, outcome_topology, always({}), 1, true},
+      {"solve", "values and linear solution to a true relative residual of 1e-8", prepare_solve,
+       run_solve, outcome_solve, work_solve},
+      {"step", "rotations, all coarse matrices, three cycles", prepare_step, run_step, outcome_step,
+       [](const Trial& t) { return t.is_paper() ? counts::kStepPaper : counts::kStep; }, 2},
+  };
+}
+
+const std::vector<Phase>& phases() {
+  static const std::vector<Phase> all = [] {
+    std::vector<Phase> out = product_phases();
+    for (const Phase& phase : value_phases()) out.push_back(phase);
+    for (const Phase& phase : whole_phases()) out.push_back(phase);
+    return out;
+  }();
+  return all;
+}
+
+}  // namespace kerf::bench
