@@ -32,11 +32,16 @@ const std::vector<Candidate>& candidates() {
   constexpr std::int32_t kMostForJacobi = 400000;
   static const std::vector<Candidate> all{
       {"cpu", "the CPU backend with its defaults", "cpu", {}, {}},
+      {"reference",
+       "the readable reference that all others are tested against",
+       "reference",
+       {},
+       {}},
       {"cuda", "the CUDA backend with its defaults", "cuda", {}, {}},
-      {"dense24", "a plain 24x24 product for each cell", "cpu", {}, {"operator"}},
+      {"dense24", "a plain 24x24 product for each cell", "reference", {}, {"operator"}},
       {"paper",
        "the solver of the 2011 paper: Gauss-Seidel with omega 1.7, V(1,1) alone",
-       "cpu",
+       "reference",
        paper_solver(),
        {"smooth-gauss-seidel", "cycle", "solve", "step"}},
       {"cg-jacobi",

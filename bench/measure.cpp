@@ -215,6 +215,10 @@ std::vector<Entrant> SceneRun::entrants_of(const Phase& phase) {
   for (std::size_t i = 0; i < trials_.size(); ++i) {
     const Candidate& candidate = trials_[i]->candidate;
     if (!candidate.phases.empty() && !candidate.phases.contains(phase.name)) continue;
+    // Gauss-Seidel is at home in the reference backend alone.
+    if (phase.name == std::string_view("smooth-gauss-seidel") &&
+        trials_[i]->backend().name() != std::string_view("reference"))
+      continue;
     const std::int32_t vertices = body_->finest().vertices();
     if (candidate.most_vertices > 0 && vertices > candidate.most_vertices) {
       listener_.note(text("skipped ", phase.name, " of ", scene_, " by ", candidate.name, ": ",

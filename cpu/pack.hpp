@@ -14,9 +14,6 @@
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
-#define KERF_AVX2 1
-#else
-#define KERF_AVX2 0
 #endif
 
 namespace kerf::cpu {
@@ -86,7 +83,7 @@ bool all(const PackMask<S>& mask) {
 }
 
 inline Pack<float> fma(const Pack<float>& a, const Pack<float>& b, const Pack<float>& c) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   return Pack<float>::Vector(_mm256_fmadd_ps(__m256(a.v), __m256(b.v), __m256(c.v)));
 #else
   Pack<float> out;
@@ -95,7 +92,7 @@ inline Pack<float> fma(const Pack<float>& a, const Pack<float>& b, const Pack<fl
 #endif
 }
 inline Pack<double> fma(const Pack<double>& a, const Pack<double>& b, const Pack<double>& c) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   return Pack<double>::Vector(_mm256_fmadd_pd(__m256d(a.v), __m256d(b.v), __m256d(c.v)));
 #else
   Pack<double> out;
@@ -104,7 +101,7 @@ inline Pack<double> fma(const Pack<double>& a, const Pack<double>& b, const Pack
 #endif
 }
 inline Pack<float> sqrt(const Pack<float>& a) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   return Pack<float>::Vector(_mm256_sqrt_ps(__m256(a.v)));
 #else
   Pack<float> out;
@@ -113,7 +110,7 @@ inline Pack<float> sqrt(const Pack<float>& a) {
 #endif
 }
 inline Pack<double> sqrt(const Pack<double>& a) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   return Pack<double>::Vector(_mm256_sqrt_pd(__m256d(a.v)));
 #else
   Pack<double> out;
@@ -136,7 +133,7 @@ void store_pack(S* to, const Pack<S>& pack) {
 /// One vector of each lane's vertex. Vectors are 3 scalars apart; the array has one scalar more
 /// than they need, since four are read.
 inline kernels::Vec3<Pack<float>> gather(const float* x, const std::int32_t* vertex) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   const auto pair = [&](int low, int high) {
     return _mm256_insertf128_ps(
         _mm256_castps128_ps256(_mm_loadu_ps(x + 3 * std::size_t(vertex[low]))),
@@ -156,7 +153,7 @@ inline kernels::Vec3<Pack<float>> gather(const float* x, const std::int32_t* ver
 #endif
 }
 inline kernels::Vec3<Pack<double>> gather(const double* x, const std::int32_t* vertex) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   const __m256d a = _mm256_loadu_pd(x + 3 * std::size_t(vertex[0]));
   const __m256d b = _mm256_loadu_pd(x + 3 * std::size_t(vertex[1]));
   const __m256d c = _mm256_loadu_pd(x + 3 * std::size_t(vertex[2]));
@@ -177,7 +174,7 @@ inline kernels::Vec3<Pack<double>> gather(const double* x, const std::int32_t* v
 
 /// Writes the lanes as records of four scalars one after the other; the fourth is zero.
 inline void scatter_records(float* to, const kernels::Vec3<Pack<float>>& f) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   const __m256 x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_ps();
   const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
   const __m256 z0_low = _mm256_unpacklo_ps(z, zero), z0_high = _mm256_unpackhi_ps(z, zero);
@@ -197,7 +194,7 @@ inline void scatter_records(float* to, const kernels::Vec3<Pack<float>>& f) {
 #endif
 }
 inline void scatter_records(double* to, const kernels::Vec3<Pack<double>>& f) {
-#if KERF_AVX2
+#if defined(__AVX2__) && defined(__FMA__)
   const __m256d x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_pd();
   const __m256d xy_low = _mm256_unpacklo_pd(x, y), xy_high = _mm256_unpackhi_pd(x, y);
   const __m256d z0_low = _mm256_unpacklo_pd(z, zero), z0_high = _mm256_unpackhi_pd(z, zero);

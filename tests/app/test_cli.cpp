@@ -148,8 +148,11 @@ TEST_F(KerfCommand, RefusesBadScenes) {
                  {"--set material.poisson=0.5: ", "0.5"});
   expect_refused(run_scene(kBlock, "--set material.young=nan"), 2, {"finite"});
   expect_refused(run_scene(kBlock, "--set time.step=0"), 2, {"--set time.step=0"});
-  expect_refused(run_scene(kBlock, "--set solver.precision=mixed"), 2,
-                 {"--set solver.precision=mixed: ", "\"double\""});
+  expect_refused(run_scene(kBlock, "--set solver.precision=single"), 2,
+                 {"--set solver.precision=single: ", "\"double\"", "\"mixed\""});
+  expect_refused(
+      run_scene(kBlock, "--set solver.precision=mixed --set solver.smoother=gauss-seidel"), 2,
+      {"--set solver.precision=mixed: ", "chebyshev"});
   expect_refused(run_scene("[body]\nshape = \"box\"\nsize = [1,1,1]\n[time]\nmode = \"static\"\n"),
                  2, {"scene.toml:5: ", "[[support]]"});
   expect_refused(run_scene(kBlock + cut_at(0.5, 0.1, "state = \"reference\"\n")), 2,

@@ -120,7 +120,7 @@ TEST(Validate, NamesWhatMakesNoSense) {
          s.supports.clear();
          s.time.mode = TimeMode::statics;
        }},
-      {"double", [](auto& s) { s.solver.precision = Precision::mixed; }},
+      {"double", [](auto& s) { s.solver.precision = Precision::single; }},
   });
 }
 
