@@ -69,7 +69,8 @@ struct Snapshot {
 
 class Simulation {
  public:
-  /// Called between parts of a long step: phase name, cycles so far, current residual.
+  /// Called between parts of a long step: phase name, cycles so far, current residual. Nothing of
+  /// the simulation may be read then.
   using Progress = std::function<void(const char* phase, int cycles, double residual)>;
 
   /// @throws Error (bad_input) for a setup that makes no sense; Error (unavailable) when memory
@@ -100,7 +101,7 @@ class Simulation {
   std::size_t hanging() const;   ///< hanging corners, each place once
   std::size_t pieces() const;
   std::size_t links_cut() const;  ///< by blades, so far
-  std::size_t bytes() const;      ///< held by body, hierarchy and backend
+  std::size_t bytes() const;      ///< held by body, hierarchy, backend and surface
   PhaseTimes seconds() const;
   const std::vector<std::string>& warnings() const;
 

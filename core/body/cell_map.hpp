@@ -18,16 +18,17 @@ struct CellMap {
 
   /// The position of point q, m. Leaves that share the corners of a face give the same bits on it,
   /// and so do all leaves in the reference state.
-  Vec3d position(const Vec3i& q) const {
+  Vec3d position(const Vec3i& q) const { return position_at({1.0 * q[0], 1.0 * q[1], 1.0 * q[2]}); }
+  /// The same between such points, and a little beside the leaf.
+  Vec3d position_at(const Vec3d& q) const {
     if (corners == nullptr) {
       Vec3d p;
-      for (int d = 0; d < 3; ++d) {
-        const auto k = static_cast<std::size_t>(d);
-        p[d] = lattice->origin[d] + (corner[k] + 0.5 * q[k]) * lattice->spacing;
-      }
+      for (int d = 0; d < 3; ++d)
+        p[d] = lattice->origin[d] +
+               (corner[static_cast<std::size_t>(d)] + 0.5 * q[d]) * lattice->spacing;
       return p;
     }
-    const double x = fraction(q[0]), y = fraction(q[1]), z = fraction(q[2]);
+    const double x = fraction(q.x), y = fraction(q.y), z = fraction(q.z);
     return mix(mix(mix(corners[0], corners[1], x), mix(corners[2], corners[3], x), y),
                mix(mix(corners[4], corners[5], x), mix(corners[6], corners[7], x), y), z);
   }
@@ -51,7 +52,7 @@ struct CellMap {
   }
 
  private:
-  double fraction(std::int32_t q) const { return 0.5 * q / side; }
+  double fraction(double q) const { return 0.5 * q / side; }
   /// Exactly a at 0 and b at 1.
   static Vec3d mix(const Vec3d& a, const Vec3d& b, double t) { return (1 - t) * a + t * b; }
 };

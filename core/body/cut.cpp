@@ -16,13 +16,17 @@ namespace {
 
 constexpr double kMaxBladeRatio = 1e6;
 
-/// A crossing of one half of a link.
+/// A crossing of one part of a link.
 struct Hit {
   LinkKey key = 0;
-  int end = 0;     ///< whose half it is: 0 the lower cell's
-  double t = 0;    ///< 0 at that cell's centre, 1 at the centre of the shared face
-  Vec3f normal{};  ///< unit, reference state
+  int end = 0;          ///< whose part it is: 0 the lower cell's
+  double distance = 0;  ///< from that cell's centre, m, reference state
+  bool apart = false;   ///< the link was cut before
+  Vec3f normal{};       ///< unit, reference state
 };
+
+/// Two crossings nearer than this are one: records are floats. In cells.
+constexpr double kSamePlace = 1e-6;
 
 double largest(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
@@ -135,9 +139,13 @@ class LinkSearch {
       const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves[i])];
       const CellMap cell{&body_.lattice(), node.corner, 1 << node.size_log2,
                          corners_.empty() ? nullptr : corners_.data() + 8 * i};
-      const Box3 box = box_of(cell, {0, 0, 0}, cell.side);
+      Box3 box = box_of(cell, {0, 0, 0}, cell.side);
+      // Parts of links that were cut may reach beyond the cell.
+      for (int face = 0; node.size_log2 == 0 && face < 6; ++face)
+        if ((node.cut_mask >> face & 1) != 0) box.add(cell.position_at(far_end(node.corner, face)));
       if (!box.overlaps(blade_box)) continue;
       near.push_back(cell);
+      masks_.push_back(node.size_log2 == 0 ? node.cut_mask : std::uint8_t{0});
       boxes_.push_back(box);
     }
     return near;
@@ -171,6 +179,7 @@ class LinkSearch {
   void test_leaf(std::size_t leaf) {
     if (tested_[leaf] == number_) return;
     tested_[leaf] = number_;
+    mask_ = masks_[leaf];
     test_cube(near_[leaf], {0, 0, 0}, near_[leaf].side, boxes_[leaf]);
   }
 
@@ -189,26 +198,47 @@ class LinkSearch {
     }
   }
 
-  /// Tests the six half links of finest cell `v` of a leaf.
+  /// How far the material of finest cell `c` reaches along its link at face 2 axis + side, in cells
+  /// from the centre: to the shared face, or to where the link was cut before.
+  double reach(const Vec3i& c, int face, bool* apart) const {
+    Vec3i lower = c;
+    lower[static_cast<std::size_t>(face / 2)] += face % 2 - 1;
+    const LinkCut* record = body_.record(lower, face / 2);
+    *apart = record != nullptr;
+    if (record == nullptr) return 0.5;
+    return record->end[1 - face % 2].distance / body_.lattice().spacing + kSamePlace;
+  }
+  /// The same as a point of a finest leaf, for CellMap.
+  Vec3d far_end(const Vec3i& c, int face) const {
+    bool apart = false;
+    Vec3d q{1, 1, 1};
+    q[face / 2] += 2 * (face % 2 == 1 ? 1 : -1) * reach(c, face, &apart);
+    return q;
+  }
+
+  /// Tests the parts of the six links of finest cell `v` of a leaf that move with it.
   void test_finest(const CellMap& cell, const Vec3i& v) {
     const Lattice& lattice = body_.lattice();
     const Vec3i c{cell.corner[0] + v[0], cell.corner[1] + v[1], cell.corner[2] + v[2]};
     const Vec3i center{2 * v[0] + 1, 2 * v[1] + 1, 2 * v[2] + 1};
     const Int3 p = quantiser_(cell.position(center));
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      for (int side = 0; side < 2; ++side) {
-        Vec3i face = center, neighbour = c, lower = c;
-        face[axis] += 2 * side - 1;
-        neighbour[axis] += 2 * side - 1;
-        lower[axis] += side - 1;
-        double t = 0;
-        if (segment_crosses_triangle(p, quantiser_(cell.position(face)), blade_.points[0],
-                                     blade_.points[1], blade_.points[2], &t) == 0 ||
-            body_.leaf_at(neighbour) < 0)
-          continue;
-        hits_.push_back({lattice.link_key(lower, static_cast<int>(axis)), 1 - side, t,
-                         reference_normal(cell, center)});
-      }
+    for (int face = 0; face < 6; ++face) {
+      const int axis = face / 2, side = face % 2;
+      Vec3i neighbour = c, lower = c;
+      neighbour[static_cast<std::size_t>(axis)] += 2 * side - 1;
+      lower[static_cast<std::size_t>(axis)] += side - 1;
+      bool apart = false;
+      const double length = (mask_ >> face & 1) != 0 ? reach(c, face, &apart) : 0.5;
+      Vec3d far{1.0 * center[0], 1.0 * center[1], 1.0 * center[2]};
+      far[axis] += (2 * side - 1) * 2 * length;
+      double t = 0;
+      if (segment_crosses_triangle(p, quantiser_(cell.position_at(far)), blade_.points[0],
+                                   blade_.points[1], blade_.points[2], &t) == 0 ||
+          body_.leaf_at(neighbour) < 0)
+        continue;
+      hits_.push_back({lattice.link_key(lower, axis), 1 - side, length * t * lattice.spacing, apart,
+                       reference_normal(cell, center)});
+    }
   }
 
   Vec3f reference_normal(const CellMap& cell, const Vec3i& center) const {
@@ -222,14 +252,16 @@ class LinkSearch {
   const LinkedOctree& body_;
   std::span<const Vec3d> corners_;
   Quantiser quantiser_;
-  double reach_;             // of the parts of a triangle that are searched at a time, m
-  double margin_;            // covers the rounding of every box, m
-  std::vector<Box3> boxes_;  // of the leaves near the blade
+  double reach_;                     // of the parts of a triangle that are searched at a time, m
+  double margin_;                    // covers the rounding of every box, m
+  std::vector<Box3> boxes_;          // of the leaves near the blade
+  std::vector<std::uint8_t> masks_;  // and which links of theirs were cut before
   std::vector<CellMap> near_;
   Bvh tree_;
   std::vector<std::int32_t> tested_;  // per near leaf: the last triangle it was tested against
   BladeTriangle blade_;               // the triangle at hand
   std::int32_t number_ = 0;
+  std::uint8_t mask_ = 0;  // of the leaf at hand
   std::vector<Hit> hits_;
 };
 
@@ -255,15 +287,20 @@ Box3 bounds_of(const TriangleMesh& blade) {
   return box;
 }
 
-/// Each end keeps the nearest of the crossings of one link.
-LinkCut nearest(std::span<const Hit> hits, double spacing, std::int32_t cut_id) {
-  LinkCut cut;
+/// Each end keeps the nearest of the crossings of one link. A link that was cut before may stand
+/// open: then a crossing counts for the end whose material it is in alone, if it is nearer than
+/// what is recorded.
+LinkCut nearest(std::span<const Hit> hits, double spacing, std::int32_t cut_id,
+                const LinkCut* before) {
+  LinkCut cut = before == nullptr ? LinkCut{} : *before;
   double best[2] = {std::numeric_limits<double>::infinity(),
                     std::numeric_limits<double>::infinity()};
+  if (before != nullptr)
+    for (int end = 0; end < 2; ++end) best[end] = before->end[end].distance - kSamePlace * spacing;
   for (const Hit& hit : hits) {
-    const double near = 0.5 * spacing * hit.t;
     for (int end = 0; end < 2; ++end) {
-      const double distance = end == hit.end ? near : spacing - near;
+      if (hit.apart && end != hit.end) continue;
+      const double distance = end == hit.end ? hit.distance : spacing - hit.distance;
       if (!(distance < best[end])) continue;
       best[end] = distance;
       cut.end[end] = {static_cast<float>(distance), hit.normal, cut_id};
@@ -310,11 +347,12 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
   for (std::size_t begin = 0, end = 0; begin < hits.size(); begin = end) {
     const LinkKey key = hits[begin].key;
     while (end < hits.size() && hits[end].key == key) ++end;
-    const LinkCut record = nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id);
-    ++event.links_hit;
     const Vec3i lower = lattice.link_lower(key);
     const int axis = Lattice::link_axis(key);
     const LinkCut* before = body.record(lower, axis);
+    const LinkCut record =
+        nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id, before);
+    ++event.links_hit;
     if (before != nullptr && comes_nearer(record, *before)) event.moved.push_back(key);
     if (body.disconnect(lower, axis, record)) event.disconnected.push_back(key);
   }

@@ -32,7 +32,8 @@ struct CutEvent {
 /// `corners` holds the deformed positions of the corners of all leaves, eight per leaf (corner
 /// x + 2y + 4z) in the order of body.leaves(), in m; empty for the reference state. A link is the
 /// two half segments from the cell centres to the centre of the shared face, carried by the
-/// trilinear map of the leaf they lie in; links inside larger leaves are tested before any leaf is
+/// trilinear map of the leaf they lie in; one that was cut before, from each centre to where it was
+/// cut, since it may stand open. Links inside larger leaves are tested before any leaf is
 /// split. The octree is refined at the hits before the links are disconnected.
 ///
 /// Ties (a blade exactly through a centre, along a link) are decided as if the body were moved by

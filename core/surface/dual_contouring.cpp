@@ -345,7 +345,7 @@ void DualContouring::add_patch(LinkKey link, const Vec3i& lower, int axis, int e
                                const Outline& o) {
   constexpr std::uint64_t kMostTriangles = 8;
   Patch& patch = patches_[link][static_cast<std::size_t>(end)];
-  const std::int32_t group = smoothing_group(o.side);
+  const std::int32_t group = o.side.cut_id;
   const std::uint64_t number = 2 * link + static_cast<std::uint64_t>(end);
   std::size_t count = 0;
   const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c) {

@@ -177,7 +177,7 @@ void SplittingCubes::add_fan(GridKey key, const DualCell& cell, int sheet, Sheet
     const int octant = corner / 3, axis = corner % 3;
     const LinkCut* cut = body_->record(octant_cell(p, octant & ~(1 << axis)), axis);
     const LinkSide side = link_side(*cut, axis, octant >> axis & 1, lattice.spacing);
-    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, smoothing_group(side),
+    out.triangles.push_back(store_->add_triangle({out.inside, a, b}, side.cut_id,
                                                  outward_normal(side),
                                                  kMostTriangles * number + out.triangles.size()));
   };

@@ -2,7 +2,6 @@
 #include "core/surface/surface.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -118,7 +117,7 @@ SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3
     }
     out.triangles.push_back(corners);
     out.normal_of.push_back(normal);
-    out.cut_id.push_back(store_.group[t] / 2);
+    out.cut_id.push_back(store_.group[t]);
   }
   return out;
 }

@@ -42,11 +42,6 @@ std::vector<LinkKey> links_around(const LinkedOctree& body, std::span<const Grid
 /// The grid edges that end in one of `points`, as 3 point_key + axis of their low end, ascending.
 std::vector<GridKey> edges_around(const Lattice& lattice, std::span<const GridKey> points);
 
-/// Smoothing group of the side of a link: faces of one cut id are smooth, but for the tip, where
-/// its two sides meet.
-inline std::int32_t smoothing_group(const LinkSide& side) {
-  return 2 * side.cut_id + (side.facing ? 1 : 0);
-}
 /// The normal of a side of a link, out of the material.
 inline Vec3f outward_normal(const LinkSide& side) {
   const double sign = side.facing ? 1 : -1;

@@ -5,7 +5,8 @@
 //
 // Layout  structure of arrays, 32-bit indices, -1 for none.
 //         Corner 3 t + k is corner k of triangle t. The corners at one vertex form a list,
-//         ascending by (smoothing group, order); each group in it shares one normal:
+//         ascending by (group, smooth part, order); the corners of a part follow each other and
+//         share a normal:
 //
 //           first_corner[v] -> 3 t + k -> next_corner[3 t + k] -> ... -> -1
 //           normal_of[3 t + k]: the normal of that corner
@@ -37,8 +38,9 @@ class TriangleStore {
   /// Needs  v has no triangles.
   void remove_vertex(std::int32_t v);
 
-  /// `group` tells which triangles around a vertex may share a normal: 2 cut_id + facing. They do
-  /// if their surfaces, whose outward normal there is `true_normal`, bend by less than a crease.
+  /// `group` tells which triangles around a vertex may share a normal: those of one cut id. They do
+  /// if their surfaces, whose outward normal there is `true_normal`, bend by less than a crease; so
+  /// the two sides of a cut do not, where they meet at its tip.
   /// `order` names the triangle among all of a surface, for ever.
   std::int32_t add_triangle(const std::array<std::int32_t, 3>& vertices, std::int32_t group,
                             const Vec3f& true_normal, std::uint64_t order);

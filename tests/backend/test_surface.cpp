@@ -138,10 +138,9 @@ TEST_P(BackendSurface, PointsMoveWithTheirOwnPiece) {
   }
 }
 
-/// A normal as the triangles that use it tell: its point, cut id and side, and the sum of its
-/// faces. The side of a triangle comes from the surface's groups, 2 cut_id + facing.
+/// A normal as the triangles that use it tell: its point and cut id, and the sum of its faces.
 struct NormalUse {
-  std::set<std::array<std::int32_t, 2>> owners;  // point and group
+  std::set<std::array<std::int32_t, 2>> owners;  // point and cut id
   Vec3d sum{};
 };
 
@@ -162,7 +161,7 @@ std::map<std::int32_t, NormalUse> uses_of_normals(const TriangleStore& store,
   return uses;
 }
 
-TEST_P(BackendSurface, NormalsAreSumsOfFacesByAreaOfOneCutIdAndSide) {
+TEST_P(BackendSurface, NormalsAreSumsOfFacesByAreaOfOneCutId) {
   // Sums that nearly cancel point anywhere; elsewhere some hundred roundings.
   constexpr double kCancelled = 1e-6, kRounding = 1e-8;
   Moved m = moved();

@@ -371,14 +371,45 @@ TEST(Cut, BetweenTwoCutsMovesNothing) {
   };
   cut(body, {}, plane(3.6), 1);
 
-  // The first leaves the high ends to the second; what passes between them is nearer to neither.
+  // The first leaves the high ends to the second; between the two, links have no material.
   const CutEvent second = cut(body, {}, plane(4.3), 2), third = cut(body, {}, plane(3.9), 3);
 
   EXPECT_EQ(second.moved.size(), 64u);
   EXPECT_TRUE(second.disconnected.empty());
   EXPECT_FALSE(second.changed());
-  EXPECT_EQ(third.links_hit, 64u);
+  EXPECT_EQ(third.links_hit, 0u);
   EXPECT_TRUE(third.moved.empty());
+}
+
+TEST(Cut, OpenCutIsMetWhereItsMaterialIs) {
+  constexpr double kFloat = 1e-5;  // of a cell: records are floats
+  LinkedOctree body(box_body({4, 4, 4}), 0);
+  const double h = body.lattice().spacing;
+  const auto plane = [&](double x) {
+    return plane_blade(at(body.lattice(), x, 2, 2), {1, 0, 0}, 1);
+  };
+  cut(body, {}, plane(1.7), 1);  // 0.2 cells from the lower centres
+  std::vector<Vec3d> apart = test::corners_of(body, [](const Vec3d& x) { return x; });
+  for (std::size_t i = 0; i < apart.size(); i += 8) {
+    const bool high = apart[i].x > at(body.lattice(), 1.5, 0, 0).x;
+    for (std::size_t k = 0; high && k < 8; ++k) apart[i + k].x += 2.5 * h;
+  }
+
+  // The material ends at 1.7 and begins again at 1.7 + 2.5. The lower cells end at 2.
+  const CutEvent air = cut(body, apart, plane(1.9), 2);
+  const CutEvent far_side = cut(body, apart, plane(4.3), 3);
+
+  EXPECT_EQ(air.links_hit, 0u);
+  EXPECT_TRUE(air.moved.empty());
+  EXPECT_EQ(far_side.moved.size(), 16u);
+  EXPECT_TRUE(far_side.disconnected.empty());
+  for (const LinkKey key : far_side.moved) {
+    const LinkCut& record = body.records().at(key);
+    EXPECT_NEAR(record.end[0].distance, 0.2 * h, kFloat * h);
+    EXPECT_EQ(record.end[0].cut_id, 1);
+    EXPECT_NEAR(record.end[1].distance, 0.7 * h, kFloat * h);
+    EXPECT_EQ(record.end[1].cut_id, 3);
+  }
 }
 
 TEST(Cut, FourStampsPunchFourPieces) {
