@@ -3,7 +3,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -100,11 +99,12 @@ Place solve(const Quadric& first, const Quadric& second, const Vec& mean, Vec x,
   return {x, first.energy(x), second.energy(x)};
 }
 
-/// The best place on the faces, edges and corners of the cube.
-Vec solve_on_boundary(const Quadric& first, const Quadric& second, const Vec& mean) {
-  std::array<Place, 26> places;
-  std::size_t count = 0;
-  double least = std::numeric_limits<double>::infinity();
+/// The best place on the faces, edges and corners of the cube; of those that fit alike, as the two
+/// ends of an edge that runs through the cube, the nearest to the mean.
+Vec solve_on_boundary(const Quadric& q, const Vec& mean) {
+  constexpr double kTie = 1e-12;  // squares of distances
+  Vec best = mean;
+  double least = std::numeric_limits<double>::infinity(), nearest = least;
   for (int part = 1; part < 27; ++part) {  // per axis: free, at the low side, at the high side
     const int state[3] = {part % 3, part / 3 % 3, part / 9};
     unsigned free = 0;
@@ -113,49 +113,49 @@ Vec solve_on_boundary(const Quadric& first, const Quadric& second, const Vec& me
       if (state[d] == 0) free |= 1u << d;
       if (state[d] != 0) x[d] = state[d] == 1 ? -kHalf : kHalf;
     }
-    const Place place = solve(first, second, mean, x, free);
-    if (!in_cube(place.x)) continue;
-    least = std::min(least, place.first);
-    places[count++] = place;
-  }
-  // Of those that fit the first hits about as well, those that fit the second best; of these, as
-  // the two ends of an edge that runs through the cube, the nearest to the mean.
-  constexpr double kAlike = 4, kTie = 1e-12;  // squares of distances
-  const double limit = (second.hits == 0 ? 1 : kAlike) * std::max(least, 0.0) + kTie;
-  double least_second = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < count; ++i)
-    if (places[i].first <= limit) least_second = std::min(least_second, places[i].second);
-  Vec best = mean;
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < count; ++i) {
-    const double distance = (places[i].x - mean).squaredNorm();
-    if (places[i].first > limit || places[i].second > least_second + kTie || distance >= nearest)
-      continue;
+    const Place place = solve(q, Quadric({}, false), mean, x, free);
+    const double distance = (place.x - mean).squaredNorm();
+    if (!in_cube(place.x) || !(place.first < least + kTie)) continue;
+    if (place.first > least - kTie && distance >= nearest) continue;
+    least = place.first;
     nearest = distance;
-    best = places[i].x;
+    best = place.x;
   }
   return best;
 }
 
-Vec fit(const Quadric& first, const Quadric& second) {
-  const Vec mean =
-      (first.hits * first.mean + second.hits * second.mean) / (first.hits + second.hits);
-  if (!(first.largest > 0)) return mean;
-  const Place place = solve(first, second, mean, Vec::Zero(), 7);
-  return in_cube(place.x) ? place.x : solve_on_boundary(first, second, mean);
+Vec fit(const Quadric& q) {
+  if (q.flat || !(q.largest > 0)) return q.mean;  // the common case, without eigenvectors
+  const Vec x = solve(q, Quadric({}, false), q.mean, Vec::Zero(), 7).x;
+  return in_cube(x) ? x : solve_on_boundary(q, q.mean);
+}
+
+/// From x, which lies in the cube, towards y until the cube ends.
+Vec stay_in_cube(const Vec& x, const Vec& y) {
+  double part = 1;
+  for (int d = 0; d < 3; ++d) {
+    if (y[d] > kHalf) part = std::min(part, (kHalf - x[d]) / (y[d] - x[d]));
+    if (y[d] < -kHalf) part = std::min(part, (-kHalf - x[d]) / (y[d] - x[d]));
+  }
+  return x + std::max(part, 0.0) * (y - x);
+}
+
+/// Fits `soft` among the places that fit `firm`. Where the best of them lies outside, as far
+/// towards it as the cube allows: straight on, since a search along the sides would let neighbours
+/// on a rim slide to opposite ends.
+Vec fit_along(const Quadric& firm, const Quadric& soft) {
+  const Vec mean = (firm.hits * firm.mean + soft.hits * soft.mean) / (firm.hits + soft.hits);
+  const Vec best = solve(firm, soft, mean, Vec::Zero(), 7).x;
+  if (in_cube(best)) return best;
+  const Vec nearest = solve(firm, Quadric({}, false), mean, Vec::Zero(), 7).x;
+  return stay_in_cube(stay_in_cube(fit(firm), nearest), best);
 }
 
 }  // namespace
 
 Vec3d fit_vertex(std::span<const SurfaceHit> hits) {
   const Quadric firm(hits, true), soft(hits, false);
-  Vec x;
-  if (firm.hits > 0 && soft.hits > 0) {
-    x = fit(firm, soft);
-  } else {
-    const Quadric &some = firm.hits > 0 ? firm : soft, &none = firm.hits > 0 ? soft : firm;
-    x = some.flat ? some.mean : fit(some, none);  // flat is the common case
-  }
+  const Vec x = firm.hits == 0 ? fit(soft) : soft.hits == 0 ? fit(firm) : fit_along(firm, soft);
   Vec3d out;
   for (int d = 0; d < 3; ++d) out[d] = std::clamp(x[d], -kHalf, kHalf);
   return out;
