@@ -70,23 +70,18 @@ void for_counting(const Eigenvalues& eigen, double largest, const Visit& visit) 
       visit(Vec(eigen.eigenvectors().col(k)), eigen.eigenvalues()[k]);
 }
 
-/// A place for the vertex, and how badly it fits.
-struct Place {
-  Vec x = Vec::Zero();
-  double first = 0, second = 0;  // energies
-};
-
-/// The least of `first`, and in the directions that it leaves open the least of `second`, nearest
-/// to `mean` in those that neither counts. Only the `free` components of x are unknown.
-Place solve(const Quadric& first, const Quadric& second, const Vec& mean, Vec x, unsigned free) {
+/// The least of `first`, and in the directions that it leaves open the least of `second` (null:
+/// there is none), nearest to `mean` in those that neither counts. Only the `free` components of x
+/// are unknown.
+Vec solve(const Quadric& first, const Quadric* second, const Vec& mean, Vec x, unsigned free) {
   Mat open = Mat::Zero();  // projects onto the directions that are not settled yet
   for (int d = 0; d < 3; ++d)
     if ((free >> d & 1) != 0) {
       open(d, d) = 1;
       x[d] = mean[d];
     }
-  for (const Quadric* q : {&first, &second}) {
-    if (q->hits == 0) continue;
+  for (const Quadric* q : {&first, second}) {
+    if (q == nullptr) continue;
     const Vec b = open * (q->b - q->a * x);
     Mat settled = Mat::Zero();
     for_counting(Eigenvalues(open * q->a * open), q->largest, [&](Vec along, double value) {
@@ -96,14 +91,14 @@ Place solve(const Quadric& first, const Quadric& second, const Vec& mean, Vec x,
     });
     open -= settled;
   }
-  return {x, first.energy(x), second.energy(x)};
+  return x;
 }
 
 /// The best place on the faces, edges and corners of the cube; of those that fit alike, as the two
 /// ends of an edge that runs through the cube, the nearest to the mean.
-Vec solve_on_boundary(const Quadric& q, const Vec& mean) {
+Vec solve_on_boundary(const Quadric& q) {
   constexpr double kTie = 1e-12;  // squares of distances
-  Vec best = mean;
+  Vec best = q.mean;
   double least = std::numeric_limits<double>::infinity(), nearest = least;
   for (int part = 1; part < 27; ++part) {  // per axis: free, at the low side, at the high side
     const int state[3] = {part % 3, part / 3 % 3, part / 9};
@@ -113,21 +108,21 @@ Vec solve_on_boundary(const Quadric& q, const Vec& mean) {
       if (state[d] == 0) free |= 1u << d;
       if (state[d] != 0) x[d] = state[d] == 1 ? -kHalf : kHalf;
     }
-    const Place place = solve(q, Quadric({}, false), mean, x, free);
-    const double distance = (place.x - mean).squaredNorm();
-    if (!in_cube(place.x) || !(place.first < least + kTie)) continue;
-    if (place.first > least - kTie && distance >= nearest) continue;
-    least = place.first;
+    x = solve(q, nullptr, q.mean, x, free);
+    const double energy = q.energy(x), distance = (x - q.mean).squaredNorm();
+    if (!in_cube(x) || !(energy < least + kTie)) continue;
+    if (energy > least - kTie && distance >= nearest) continue;
+    least = energy;
     nearest = distance;
-    best = place.x;
+    best = x;
   }
   return best;
 }
 
 Vec fit(const Quadric& q) {
   if (q.flat || !(q.largest > 0)) return q.mean;  // the common case, without eigenvectors
-  const Vec x = solve(q, Quadric({}, false), q.mean, Vec::Zero(), 7).x;
-  return in_cube(x) ? x : solve_on_boundary(q, q.mean);
+  const Vec x = solve(q, nullptr, q.mean, Vec::Zero(), 7);
+  return in_cube(x) ? x : solve_on_boundary(q);
 }
 
 /// From x, which lies in the cube, towards y until the cube ends.
@@ -145,9 +140,9 @@ Vec stay_in_cube(const Vec& x, const Vec& y) {
 /// on a rim slide to opposite ends.
 Vec fit_along(const Quadric& firm, const Quadric& soft) {
   const Vec mean = (firm.hits * firm.mean + soft.hits * soft.mean) / (firm.hits + soft.hits);
-  const Vec best = solve(firm, soft, mean, Vec::Zero(), 7).x;
+  const Vec best = solve(firm, &soft, mean, Vec::Zero(), 7);
   if (in_cube(best)) return best;
-  const Vec nearest = solve(firm, Quadric({}, false), mean, Vec::Zero(), 7).x;
+  const Vec nearest = solve(firm, nullptr, mean, Vec::Zero(), 7);
   return stay_in_cube(stay_in_cube(fit(firm), nearest), best);
 }
 

@@ -26,7 +26,8 @@ struct SurfaceHit {
 /// Errors  points of one plane: x lies in it to rounding. Bent by an angle below about 0.1 between
 ///         normals, hits count as smooth. Never leaves the cube, never gives a NaN.
 /// Source  Ju, Losasso, Schaefer, Warren 2002 [JLSW02], section 2.3. The bounds are exact, by the
-///         faces, edges and corners of the cube; firm points are ours.
+///         faces, edges and corners of the cube, but where firm points meet others: there x stops
+///         on its way out of the cube. Firm points are ours.
 Vec3d fit_vertex(std::span<const SurfaceHit> hits);
 
 }  // namespace kerf

@@ -26,9 +26,8 @@ class SurfaceBuilder {
 };
 
 /// One vertex for each sheet of each dual cell, two triangles for each side of a cut link.
-/// Source  Ju, Losasso, Schaefer, Warren 2002 [JLSW02]; Wu, Dick, Westermann 2011 [WDW11] as told
-/// in
-///         [WWD15] section 2.3.2.
+/// Source  Ju, Losasso, Schaefer, Warren 2002 [JLSW02]; Wu, Dick, Westermann 2011 [WDW11], as
+///         [WWD15] section 2.3.2 tells it.
 std::unique_ptr<SurfaceBuilder> make_dual_contouring();
 
 /// Two vertices on each cut link, and in each dual cell a fan around one vertex for each sheet.
