@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Two passes as in the reference backend: cells write records, vertices sum them in their fixed
-// order. Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time,
-// and what follows a sum (residual, step of Chebyshev) is done while it is in registers.
+// Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time, and what
+// follows a sum (residual, step of Chebyshev) is done while it is in registers.
 #include "cpu/fast_backend.hpp"
 
 #include <omp.h>
@@ -28,15 +27,11 @@ FastBackend<S>::FastBackend(int threads)
 
 template <class S>
 std::size_t FastBackend<S>::bytes() const {
-  std::size_t sum = bytes_of(records_) + bytes_of(faces_);
-  const auto add_values = [&](const auto& values) {
-    sum += bytes_of(values.rotation) + bytes_of(values.stiffness) + bytes_of(values.mass) +
-           bytes_of(values.side) + bytes_of(values.materials);
-  };
-  add_values(exact_);
-  add_values(single_);
+  std::size_t sum = bytes_of(partial_) + bytes_of(coarse_records_) + bytes_of(faces_) +
+                    bytes_of(exact_.rotation) + bytes_of(single_.rotation) +
+                    bytes_of(exact_.materials) + bytes_of(single_.materials);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.packed.bytes() + bytes_of(level.matrices) + bytes_of(level.inverse_diagonal);
+    sum += level.patched.bytes() + bytes_of(level.matrices) + bytes_of(level.inverse_diagonal);
     for (const FastVector& vector : level.vectors)
       sum += bytes_of(vector.single) + bytes_of(vector.exact);
   }
@@ -44,11 +39,9 @@ std::size_t FastBackend<S>::bytes() const {
   return sum;
 }
 
-// Three scalars a vertex, three of the vertex that padding lanes read, and one that loads of four
-// reach beyond.
 template <class S>
-void FastBackend<S>::allocate(FastVector& vector, std::int32_t vertices, bool exact) const {
-  const std::size_t size = 3 * static_cast<std::size_t>(vertices) + 4;
+void FastBackend<S>::allocate(FastVector& vector, const PatchedLevel& level, bool exact) const {
+  const std::size_t size = kTileScalars * level.tiles();
   vector.single.clear();
   vector.exact.clear();
   if (exact || std::is_same_v<S, double>)
@@ -76,51 +69,35 @@ PackedMaterial<T> pack_material(double poisson, bool lumped) {
   return out;
 }
 
-template <class S>
-void FastBackend<S>::fill_values(const Hierarchy& hierarchy) {
-  const PackedLevel& packed = levels_[0].packed;
-  const auto fill = [&](auto& values) {
-    using T = std::decay_t<decltype(values.stiffness[0])>;
-    const std::size_t lanes = packed.cell.size();
-    values.stiffness.assign(lanes, 0);
-    values.mass.assign(lanes, 0);
-    values.side.assign(lanes, 1);
-    values.rotation.assign(4 * lanes, 0);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      values.rotation[4 * kGroup * (lane / kGroup) + lane % kGroup] = 1;
-      const std::int32_t c = packed.cell[lane];
-      if (c < 0) continue;
-      values.stiffness[lane] = static_cast<T>(hierarchy.values[c].stiffness);
-      values.mass[lane] = static_cast<T>(hierarchy.values[c].mass);
-      values.side[lane] = static_cast<T>(hierarchy.spacing * (1 << packed.level->size_log2[c]));
-    }
-    values.materials.clear();
-    for (const double poisson : hierarchy.poisson)
-      values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
-  };
-  fill(exact_);
-  if constexpr (!std::is_same_v<S, double>) fill(single_);
+template <class T>
+void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, FinestValues<T>& values) {
+  values.rotation.assign(4 * finest.cell.size(), 0);
+  for (std::size_t g = 0; g < finest.groups(); ++g)
+    std::fill_n(values.rotation.data() + 4 * kGroup * g, kGroup, T(1));
+  values.materials.clear();
+  for (const double poisson : hierarchy.poisson)
+    values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
 }
 
 template <class S>
 void FastBackend<S>::load(const Hierarchy& hierarchy) {
   hierarchy_ = &hierarchy;
+  waiting_ = -1;
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
-    level.packed = pack_level(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].packed);
-    level.columns.clear();
-    for (const Weights& w : l == 0 ? level.packed.from_corners : level.packed.from_slots)
-      level.columns.push_back(columns_of<Pack<S>>(w));
+    level.patched = make_patches(hierarchy, l, threads_);
+    if (l > 0) fill_weights(level.patched, levels_[l - 1].patched);
     level.bound = 0;
     level.solution_is_zero = false;
     level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (std::size_t x = 0; x < level.vectors.size(); ++x)
-      allocate(level.vectors[x], level.vertices(), x >= kLevelVectors);
-    level.inverse_diagonal.assign(6 * level.packed.vertices(), 0);
-    level.matrices.assign(l == 0 ? 0 : kEntries * level.packed.cell.size(), 0);
+      allocate(level.vectors[x], level.patched, x >= kLevelVectors);
+    level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
+    level.matrices.assign(l == 0 ? 0 : kEntries * level.patched.cell.size(), 0);
   }
-  fill_values(hierarchy);
+  start_values(hierarchy, levels_[0].patched, exact_);
+  if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
   coarsest_ = std::make_unique<AssembledLevel>(hierarchy.levels.back());
   coarsest_factor_.analyse(*coarsest_);
 }
@@ -129,7 +106,7 @@ template <class S>
 int FastBackend<S>::add_vector() {
   if (!levels_.empty()) {
     levels_[0].vectors.emplace_back();
-    allocate(levels_[0].vectors.back(), levels_[0].vertices(), true);
+    allocate(levels_[0].vectors.back(), levels_[0].patched, true);
   }
   return vectors_on_finest_++;
 }
@@ -150,16 +127,24 @@ void FastBackend<S>::round_rotations() {
 
 template <class S>
 void FastBackend<S>::rotate_cells(int displacement) {
+  settle();
+  const PatchedLevel& l = levels_[0].patched;
   const double* u = levels_[0].vectors[displacement].exact.data();
-  parallel(levels_[0].groups(), kWorthGroups, [&](std::int32_t g) {
-    rotate_group(levels_[0].packed, exact_, static_cast<std::size_t>(g), u);
-  });
+  const auto patches = static_cast<std::int32_t>(l.patches.size());
+#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) if (patches > 1)
+  for (std::int32_t p = 0; p < patches; ++p) {
+    const Patch& patch = l.patches[p];
+    PatchPoints<double> points(l, patch);
+    points.load([&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u);
+    for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g)
+      rotate_group(l, exact_, static_cast<std::size_t>(g), points.x());
+  }
   round_rotations();
 }
 
 template <class S>
 void FastBackend<S>::read_rotations(std::span<double> out) const {
-  const PackedLevel& packed = levels_[0].packed;
+  const PatchedLevel& packed = levels_[0].patched;
   for (std::size_t c = 0; c < packed.lane.size(); ++c) {
     const auto lane = static_cast<std::size_t>(packed.lane[c]);
     for (std::size_t k = 0; k < 4; ++k)
@@ -169,7 +154,7 @@ void FastBackend<S>::read_rotations(std::span<double> out) const {
 
 template <class S>
 void FastBackend<S>::write_rotations(std::span<const double> in) {
-  const PackedLevel& packed = levels_[0].packed;
+  const PatchedLevel& packed = levels_[0].patched;
   for (std::size_t c = 0; c < packed.lane.size(); ++c) {
     const auto lane = static_cast<std::size_t>(packed.lane[c]);
     for (std::size_t k = 0; k < 4; ++k)
@@ -178,21 +163,29 @@ void FastBackend<S>::write_rotations(std::span<const double> in) {
   round_rotations();
 }
 
+constexpr auto kNothingBefore = [](std::size_t) {};
+
 template <class S>
 template <class T>
-void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
-                                 int out) {
+double FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
+                                   int out) {
   FastLevel<S>& l = levels_[level];
-  const T* all = products<T>(level, scale, l.vectors[in].template in<T>().data());
+  const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
-  parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
-    store(to, v, masked(sum_records(l.packed, all, v), masks ? l.fixed(v) : std::uint8_t{0}));
-  });
+  return sweep<T>(
+      level, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
+      [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
+        store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
+        return 0.0;
+      });
 }
 
 template <class S>
 void FastBackend<S>::apply(int level, int in, int out) {
   ensures(is_exact(level, in) == is_exact(level, out), "apply mixes vectors of two precisions");
+  settle();
   changed(level, out);
   if (is_exact(level, in))
     apply_typed<double>(level, scale_, true, in, out);
@@ -203,58 +196,57 @@ void FastBackend<S>::apply(int level, int in, int out) {
 template <class S>
 void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
   expects_exact(in, out);
+  settle();
   apply_typed<double>(0, scale, false, in, out);
 }
 
 template <class S>
 void FastBackend<S>::elastic_force(int displacement, int out) {
   expects_exact(displacement, out);
+  settle();
   FastLevel<S>& l = levels_[0];
   const double* u = l.vectors[displacement].exact.data();
-  double* all = records<double>(0);
-  parallel(l.groups(), kWorthGroups, [&](std::int32_t g) {
-    elastic_records(l.packed, exact_, static_cast<std::size_t>(g), u, all);
-  });
   double* to = l.vectors[out].exact.data();
-  parallel(l.vertices(), kWorthVertices,
-           [&](std::int32_t v) { store(to, v, sum_records<double>(l.packed, all, v)); });
+  sweep<double>(
+      0, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const double* x, double* y) {
+        elastic_forces(l.patched, exact_, group, x, y);
+      },
+      [&](std::size_t tile, int first, const Vec3<Pack<double>>& sum, const auto&) {
+        store_tile(to, tile, first, sum);
+        return 0.0;
+      });
 }
 
-// The n-th children of the coarse cells in the lanes: their matrices and their weights.
+// The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
+// there are some the way from corners has two steps.
 template <class S>
 void FastBackend<S>::add_children(const FastLevel<S>& from, bool finest,
                                   const std::int32_t (&child)[Pack<S>::kLanes],
                                   Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
-  const PackedLevel& packed = from.packed;
+  const PatchedLevel& packed = from.patched;
   P full[24][24];
-  bool over_slots = true;
+  bool over_slots = false;
   if (finest) {
     const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
     corner_matrices(packed, values_of<S>(), lanes, full);
-    // Held components are those of slots, so there the way from corners has two steps.
     over_slots = lanes.any_fixed;
-    if (lanes.any_fixed && lanes.any_folded) fold_matrices(packed, lanes, full);
+    if (lanes.any_fixed && lanes.any_folded) fold_matrices<P>(packed, child, full);
     if (lanes.any_fixed) mask_matrices(packed, lanes, full);
   } else {
     stored_matrices(packed, from.matrices.data(), child, full);
   }
-  const std::vector<Weights>& table = over_slots ? packed.from_slots : packed.from_corners;
+  Weights weights[P::kLanes];
   const Weights* w[P::kLanes];
-  std::int32_t first = -1;
-  bool alike = over_slots != finest;  // the columns that are at hand
   for (int k = 0; k < P::kLanes; ++k) {
     w[k] = nullptr;
     if (child[k] < 0) continue;  // its matrix is zero
-    const std::int32_t index = packed.weights[child[k]];
-    w[k] = &table[static_cast<std::size_t>(index)];
-    alike = alike && (first < 0 || index == first);
-    first = index;
+    weights[k] = child_weights(*packed.level, child[k], over_slots);
+    w[k] = &weights[k];
   }
-  if (alike)
-    add_product(full, from.columns[static_cast<std::size_t>(first)], sum);
-  else
-    add_product(full, columns_of<P>(w), sum);
+  add_product(full, columns_of<P>(w), sum);
 }
 
 template <class S>
@@ -262,10 +254,11 @@ void FastBackend<S>::coarsen(int fine) {
   using P = Pack<S>;
   const FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
-  const Level& coarse = *to.packed.level;
-  parallel(to.groups(), kWorthMatrices, [&](std::int32_t g) {
+  const Level& coarse = *to.patched.level;
+  const auto groups = static_cast<std::int32_t>(to.patched.groups());
+  parallel(groups, kWorthGroups, [&](std::int32_t g) {
     for_packs<S>([&](int first) {
-      const std::int32_t* cells = to.packed.cell.data() + kGroup * g + first;
+      const std::int32_t* cells = to.patched.cell.data() + kGroup * g + first;
       P sum[kEntries] = {};
       for (std::int32_t n = 0;; ++n) {
         std::int32_t child[P::kLanes];
@@ -288,58 +281,99 @@ void FastBackend<S>::coarsen(int fine) {
 }
 
 template <class S>
+void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S>>& upper,
+                 const Vec3<Pack<S>>& lower) {
+  using P = Pack<S>;
+  const std::uint8_t* fixed = l.fixed(tile, first);
+  P keep[3];
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
+  const auto inverse = kernels::inverse_semidefinite(kernels::Sym3<P>{
+      keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+      keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z});
+  S* to = l.inverse_diagonal.data() + 2 * kTileScalars * tile + first;
+  const P entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
+  for (int e = 0; e < 6; ++e) store_pack(to + kGroup * e, entries[e]);
+}
+
+template <class S>
+void invert_own(FastLevel<S>& l, const Patch& patch, const BlockPoints<S>& from) {
+  for (std::int32_t v = patch.first_own; v < patch.first_own + patch.own; v += kGroup)
+    for_packs<S>([&](int first) {
+      const std::uint16_t* points = l.patched.own_point.data() + v + first;
+      invert_tile(l, static_cast<std::size_t>(v / kGroup), first,
+                  gather_points(static_cast<const S*>(from.upper), points),
+                  gather_points(static_cast<const S*>(from.lower), points));
+    });
+}
+
+template <class S>
 void FastBackend<S>::prepare(int level) {
+  settle();
   FastLevel<S>& l = levels_[level];
-  const std::size_t scalars = 8 * 8 * l.packed.cell.size();  // six of eight a record
-  records_.resize(std::max(records_.size(), scalars * sizeof(S) / sizeof(double) + 1));
-  S* const blocks = reinterpret_cast<S*>(records_.data());
-  parallel(l.groups(), kWorthGroups, [&](std::int32_t g) {
-    const auto group = static_cast<std::size_t>(g);
-    if (level == 0)
-      finest_diagonals(l.packed, values_of<S>(), scale_, group, blocks);
-    else
-      stored_diagonals(l.matrices.data(), group, blocks);
-  });
-  parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
-    kernels::Sym3<S> sum{};
-    for (std::int32_t k = l.packed.level->incidence_begin[v];
-         k < l.packed.level->incidence_begin[v + 1]; ++k) {
-      const S* b = blocks + 8 * static_cast<std::size_t>(l.packed.record[k]);
-      sum += kernels::Sym3<S>{b[0], b[1], b[2], b[4], b[5], b[6]};
+  const PatchedLevel& packed = l.patched;
+  const std::size_t copies = packed.copy_point.size();
+  S* const upper = partial_sums<S>(8 * copies);
+  S* const lower = upper + 4 * copies;
+  const auto patches = static_cast<std::int32_t>(packed.patches.size());
+#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) if (patches > 1)
+  for (std::int32_t p = 0; p < patches; ++p) {
+    const Patch& patch = packed.patches[p];
+    thread_local PointBuffer<S> buffer;
+    const std::size_t scalars = 4 * static_cast<std::size_t>(patch.points);
+    S* const blocks = buffer.reserve(2 * scalars);
+    std::fill_n(blocks, 2 * scalars, S(0));
+    const BlockPoints<S> to{blocks, blocks + scalars};
+    for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g) {
+      const auto group = static_cast<std::size_t>(g);
+      if (level == 0)
+        add_finest_diagonals(packed, values_of<S>(), scale_, group, to);
+      else
+        add_stored_diagonals(packed, l.matrices.data(), group, to);
     }
-    const std::uint8_t fixed = l.fixed(v);
-    if (fixed & 1) sum.xx = sum.xy = sum.xz = 0;
-    if (fixed & 2) sum.yy = sum.xy = sum.yz = 0;
-    if (fixed & 4) sum.zz = sum.xz = sum.yz = 0;
-    const auto inverse = kernels::inverse_semidefinite(sum);
-    S* to = l.inverse_diagonal.data() + 6 * static_cast<std::size_t>(v);
-    to[0] = inverse.xx, to[1] = inverse.xy, to[2] = inverse.xz;
-    to[3] = inverse.yy, to[4] = inverse.yz, to[5] = inverse.zz;
+    invert_own(l, patch, to);
+    for (std::int32_t k = patch.first_copy; k < patch.first_copy + patch.copies; ++k) {
+      std::copy_n(to.upper + 4 * std::size_t(packed.copy_point[k]), 4, upper + 4 * std::size_t(k));
+      std::copy_n(to.lower + 4 * std::size_t(packed.copy_point[k]), 4, lower + 4 * std::size_t(k));
+    }
+  }
+  for_tiles(packed.first_shared / kGroup, l.tiles(), [&](std::size_t tile) {
+    for_packs<S>([&](int first) {
+      invert_tile(l, tile, first, shared_sums(packed, tile, first, upper),
+                  shared_sums(packed, tile, first, lower));
+    });
   });
   if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size()))
-    l.bound = estimate_spectral_bound(*this, level, *l.packed.level);
+    l.bound = estimate_spectral_bound(*this, level, *packed.level);
 }
 
 template <class S>
 void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
   const FastLevel<S>& l = levels_[level];
-  std::int32_t cells[Pack<double>::kLanes];
+  using P = Pack<double>;
+  std::int32_t cells[P::kLanes];
   std::fill(std::begin(cells), std::end(cells), -1);
   cells[0] = cell;
+  P full[24][24] = {};
   if (level == 0) {
-    Pack<double> full[24][24];
-    const FinestLanes<double> lanes(l.packed, exact_, scale_, cells);
-    corner_matrices(l.packed, exact_, lanes, full);
-    if (lanes.any_folded) fold_matrices(l.packed, lanes, full);
-    if (lanes.any_fixed) mask_matrices(l.packed, lanes, full);
+    const FinestLanes<double> lanes(l.patched, exact_, scale_, cells);
+    corner_matrices(l.patched, exact_, lanes, full);
+    if (lanes.any_folded) fold_matrices<P>(l.patched, cells, full);
+    if (lanes.any_fixed) mask_matrices(l.patched, lanes, full);
+  } else {
+    const auto lane = static_cast<std::size_t>(l.patched.lane[cell]);
+    const S* tile = l.matrices.data() + kEntries * kGroup * (lane / kGroup) + lane % kGroup;
     for (int i = 0; i < 24; ++i)
-      for (int j = 0; j <= i; ++j)
-        out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
-    return;
+      for (int j = 0; j <= i; ++j) {
+        const auto e = static_cast<std::size_t>(kernels::packed_index(i, j));
+        full[i][j].set(0, tile[kGroup * e]);
+        full[j][i].set(0, tile[kGroup * e]);
+      }
+    if (kernels::has_hanging(l.patched.level->fold[cell])) fold_matrices<P>(l.patched, cells, full);
   }
-  const auto lane = static_cast<std::size_t>(l.packed.lane[cell]);
-  for (std::size_t e = 0; e < kEntries; ++e)
-    out[e] = l.matrices[kEntries * kGroup * (lane / kGroup) + kGroup * e + lane % kGroup];
+  for (int i = 0; i < 24; ++i)
+    for (int j = 0; j <= i; ++j)
+      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
 }
 
 template <class S>

@@ -11,17 +11,33 @@
 namespace kerf::cpu {
 
 template <class S>
+double square_sum(const Vec3<Pack<S>>& v) {
+  const Pack<S> squares = fma(v.x, v.x, fma(v.y, v.y, v.z * v.z));
+  double sum = 0;
+  for (int k = 0; k < Pack<S>::kLanes; ++k) sum += static_cast<double>(squares[k]);
+  return sum;
+}
+
+template <class S>
 double FastBackend<S>::residual(int level) {
+  settle();
   FastLevel<S>& l = levels_[level];
   const S* f = l.at(kRight);
+  const S* u = l.at(kSolution);
   S* r = l.at(kResidual);
-  const S* all = l.solution_is_zero ? nullptr : products<S>(level, scale_, l.at(kSolution));
-  parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
-    Vec3<S> at = load_vertex(f, v);
-    if (all != nullptr) at -= masked(sum_records(l.packed, all, v), l.fixed(v));
-    store(r, v, at);
-  });
-  return std::sqrt(dot_typed(r, r, 3 * l.vertices()));
+  if (l.solution_is_zero) {
+    std::copy_n(f, l.scalars(), r);
+    return std::sqrt(dot_typed(r, r, l.scalars()));
+  }
+  return std::sqrt(sweep<S>(
+      level, [](std::size_t) {},
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
+      [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
+        const auto at = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
+        store_tile(r, tile, first, at);
+        return square_sum(at);
+      }));
 }
 
 template <class S>
@@ -29,94 +45,212 @@ void FastBackend<S>::smooth(int level, SweepOrder, int count) {
   for (int i = 0; i < count; ++i) chebyshev(level);
 }
 
+/// Coefficients of the steps: direction = keep * direction + take * D^-1 r.
+struct ChebyshevSteps {
+  double sigma, delta, rho;
+
+  ChebyshevSteps(double upper, double lower)
+      : sigma((upper + lower) / (upper - lower)), delta(0.5 * (upper - lower)), rho(1 / sigma) {}
+  double first_take() const { return 1 / (sigma * delta); }
+  /// keep and take of the next step but the first.
+  std::pair<double, double> next() {
+    const double following = 1 / (2 * sigma - rho);
+    const std::pair<double, double> out{following * rho, 2 * following / delta};
+    rho = following;
+    return out;
+  }
+};
+
 // Chebyshev acceleration of block Jacobi on [smallest, 1] * bound; residual, direction and update
-// of a vertex in one pass behind the sum of its records.
+// of a vertex in one pass behind the sum of what its cells add. From a zero guess the first step
+// needs no product: it is made on the fly where the second one reads it. A correction that waits is
+// added there too.
 // Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, algorithm 12.1.
 template <class S>
 void FastBackend<S>::chebyshev(int level) {
+  using V = Vec3<Pack<S>>;
+  if (waiting_ != level) settle();
   FastLevel<S>& l = levels_[level];
-  const double upper = l.bound, lower = smoother_.smallest * upper;
-  const double theta = 0.5 * (upper + lower), delta = 0.5 * (upper - lower);
-  const double sigma = theta / delta;
-  double rho = 1 / sigma;
+  ChebyshevSteps steps(l.bound, smoother_.smallest * l.bound);
   S *u = l.at(kSolution), *d = l.at(kDirection);
   const S* f = l.at(kRight);
-  for (int step = 0; step < smoother_.degree; ++step) {
-    const double next = step == 0 ? rho : 1 / (2 * sigma - rho);
-    const S keep = static_cast<S>(step == 0 ? 0 : next * rho);
-    const S take = static_cast<S>(step == 0 ? 1 / theta : 2 * next / delta);
-    rho = next;
-    const S* all = l.solution_is_zero ? nullptr : products<S>(level, scale_, u);
-    l.solution_is_zero = false;
-    parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
-      Vec3<S> r = load_vertex(f, v), before{};
-      if (all != nullptr) {
-        r -= masked(sum_records(l.packed, all, v), l.fixed(v));
-        before = load_vertex(u, v);
-      }
-      const S* b = l.inverse_diagonal.data() + 6 * static_cast<std::size_t>(v);
-      Vec3<S> direction = take * (kernels::Sym3<S>{b[0], b[1], b[2], b[3], b[4], b[5]} * r);
-      if (step > 0) direction += keep * load_vertex(d, v);
-      store(d, v, direction);
-      store(u, v, before + direction);
+  const S first_take = static_cast<S>(steps.first_take());
+  const auto from_zero = [&](std::size_t tile, int first) {
+    return Pack<S>(first_take) * l.times_inverse(tile, first, load_tile(f, tile, first));
+  };
+  const auto corrected = [&](std::size_t tile, int first) {
+    return load_tile(static_cast<const S*>(u), tile, first) + correction(l, tile, first);
+  };
+  const auto as_it_is = [&](std::size_t tile, int first) {
+    return load_tile(static_cast<const S*>(u), tile, first);
+  };
+  const auto step = [&](const auto& value, bool put, S keep, S take, bool keep_value, bool last) {
+    sweep<S>(
+        level,
+        [&](std::size_t tile) {
+          if (put)
+            for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
+        },
+        value, u,
+        [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
+        [&](std::size_t tile, int first, const V& sum, const auto& before) {
+          const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
+          const V at = before();
+          V direction = Pack<S>(take) * l.times_inverse(tile, first, r);
+          if (keep_value)
+            direction += Pack<S>(keep) * at;
+          else if (keep != 0)
+            direction += Pack<S>(keep) * load_tile(static_cast<const S*>(d), tile, first);
+          if (!last) store_tile(d, tile, first, direction);
+          store_tile(u, tile, first, at + direction);
+          return 0.0;
+        });
+  };
+  const int degree = smoother_.degree;
+  int done = 0;
+  if (l.solution_is_zero && degree == 1) {
+    for_tiles(0, l.tiles(), [&](std::size_t tile) {
+      for_packs<S>([&](int first) { store_tile(u, tile, first, from_zero(tile, first)); });
     });
+    done = 1;
+  } else if (l.solution_is_zero) {
+    const auto [keep, take] = steps.next();
+    step(from_zero, true, static_cast<S>(keep), static_cast<S>(take), true, degree == 2);
+    done = 2;
+  } else {
+    if (waiting_ == level)
+      step(corrected, true, S(0), first_take, false, degree == 1);
+    else
+      step(as_it_is, false, S(0), first_take, false, degree == 1);
+    done = 1;
+  }
+  waiting_ = -1;
+  l.solution_is_zero = false;
+  for (; done < degree; ++done) {
+    const auto [keep, take] = steps.next();
+    step(as_it_is, false, static_cast<S>(keep), static_cast<S>(take), false, done + 1 == degree);
   }
 }
 
 template <class S>
 void FastBackend<S>::restrict_residual(int fine) {
-  const FastLevel<S>& from = levels_[fine];
+  settle();
+  FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
-  const SparseWeights& rows = from.packed.restrict_;
-  const S* r = levels_[fine].at(kResidual);
+  const SparseWeights& rows = from.patched.restrict_;
+  const S* r = from.at(kResidual);
   S* f = to.at(kRight);
-  parallel(to.vertices(), kWorthVertices / 8, [&](std::int32_t v) {
-    Vec3<S> sum{};
-    for (std::int32_t k = rows.begin[v]; k < rows.begin[v + 1]; ++k)
-      sum += static_cast<S>(rows.weight[k]) * load_vertex(r, rows.vertex[k]);
-    store(f, v, masked(sum, to.fixed(v)));
+  for_tiles(0, to.tiles(), [&](std::size_t tile) {
+    alignas(32) S sums[kTileScalars];
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const std::size_t v = kGroup * tile + k;
+      S x = 0, y = 0, z = 0;
+      for (std::int32_t i = rows.begin[v]; i < rows.begin[v + 1]; ++i) {
+        const S* at = r + scalar_of(rows.vertex[i]);
+        const S w = static_cast<S>(rows.weight[i]);
+        x = std::fma(w, at[0], x);
+        y = std::fma(w, at[kGroup], y);
+        z = std::fma(w, at[2 * kGroup], z);
+      }
+      sums[k] = x, sums[kGroup + k] = y, sums[2 * kGroup + k] = z;
+    }
+    for_packs<S>([&](int first) {
+      store_tile(f, tile, first,
+                 masked(load_tile(static_cast<const S*>(sums), 0, first), to.fixed(tile, first)));
+    });
   });
   zero(fine + 1, kSolution);
 }
 
+/// The solution of a coarse level as points, which finer vertices gather.
+template <class S>
+void FastBackend<S>::load_coarse_records(int coarse) {
+  FastLevel<S>& l = levels_[coarse];
+  coarse_records_.resize(std::max(coarse_records_.size(), 4 * l.patched.vertices()));
+  const S* u = l.at(kSolution);
+  for_tiles(0, l.tiles(), [&](std::size_t tile) {
+    for_packs<S>([&](int first) {
+      S* to = coarse_records_.data() + 4 * (kGroup * tile + static_cast<std::size_t>(first));
+      for_records(load_tile(u, tile, first), [&](int lane, typename Record<S>::Vector record) {
+        __builtin_memcpy(to + 4 * lane, &record, sizeof record);
+      });
+    });
+  });
+}
+
+/// What the next level corrects in the vertices of a tile.
+template <class S>
+Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t tile,
+                                         int first) const {
+  using R = typename Record<S>::Vector;
+  static constexpr std::uint16_t kOrder[] = {0, 1, 2, 3, 4, 5, 6, 7};
+  const SparseWeights& rows = to.patched.prolong;
+  alignas(32) S sums[4 * Pack<S>::kLanes];
+  for (int k = 0; k < Pack<S>::kLanes; ++k) {
+    const std::size_t v = kGroup * tile + static_cast<std::size_t>(first + k);
+    R sum{};
+    for (std::int32_t i = rows.begin[v]; i < rows.begin[v + 1]; ++i) {
+      R one;
+      __builtin_memcpy(&one, coarse_records_.data() + 4 * std::size_t(rows.vertex[i]), sizeof one);
+      sum += static_cast<S>(rows.weight[i]) * one;
+    }
+    __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
+  }
+  return masked(gather_points(static_cast<const S*>(sums), kOrder), to.fixed(tile, first));
+}
+
+/// The correction waits for the sweep that reads the solution next.
 template <class S>
 void FastBackend<S>::prolong_correction(int fine) {
-  FastLevel<S>& to = levels_[fine];
-  const SparseWeights& rows = to.packed.prolong;
-  const S* coarse = levels_[fine + 1].at(kSolution);
+  settle();
+  load_coarse_records(fine + 1);
   changed(fine, kSolution);
-  S* u = to.at(kSolution);
-  parallel(to.vertices(), kWorthVertices, [&](std::int32_t v) {
-    Vec3<S> sum{};
-    for (std::int32_t k = rows.begin[v]; k < rows.begin[v + 1]; ++k)
-      sum += static_cast<S>(rows.weight[k]) * load_vertex(coarse, rows.vertex[k]);
-    store(u, v, load_vertex(u, v) + masked(sum, to.fixed(v)));
+  waiting_ = fine;
+}
+
+template <class S>
+void FastBackend<S>::settle() {
+  if (waiting_ < 0) return;
+  FastLevel<S>& l = levels_[waiting_];
+  waiting_ = -1;
+  S* u = l.at(kSolution);
+  for_tiles(0, l.tiles(), [&](std::size_t tile) {
+    for_packs<S>([&](int first) {
+      store_tile(u, tile, first,
+                 load_tile(static_cast<const S*>(u), tile, first) + correction(l, tile, first));
+    });
   });
 }
 
 template <class S>
 void FastBackend<S>::solve_coarsest() {
+  settle();
   FastLevel<S>& l = levels_.back();
   l.solution_is_zero = false;
-  const std::size_t size = 3 * l.packed.vertices();
+  const std::size_t size = 3 * l.patched.packed.size();
   std::vector<double> right(size), solution(size);
-  std::copy_n(l.at(kRight), size, right.begin());
+  read(static_cast<int>(levels_.size()) - 1, kRight, right);
   coarsest_factor_.solve(right, solution);
-  for (std::size_t i = 0; i < size; ++i) l.at(kSolution)[i] = static_cast<S>(solution[i]);
+  write(static_cast<int>(levels_.size()) - 1, kSolution, solution);
 }
 
 template <class S>
 void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
+  settle();
   FastLevel<S>& l = levels_[level];
   changed(level, out);
   with_types(l.vectors[in], l.vectors[out], [&](const auto* from, auto* to) {
     using T = std::decay_t<decltype(*to)>;
-    parallel(l.vertices(), kWorthVertices, [&](std::int32_t v) {
-      const S* b = l.inverse_diagonal.data() + 6 * static_cast<std::size_t>(v);
-      const auto at = load_vertex(from, v);
-      const Vec3<S> r{static_cast<S>(at.x), static_cast<S>(at.y), static_cast<S>(at.z)};
-      const Vec3<S> z = kernels::Sym3<S>{b[0], b[1], b[2], b[3], b[4], b[5]} * r;
-      store(to, v, Vec3<T>{static_cast<T>(z.x), static_cast<T>(z.y), static_cast<T>(z.z)});
+    for_tiles(0, l.tiles(), [&](std::size_t tile) {
+      alignas(32) S r[kTileScalars], z[kTileScalars];
+      for (std::size_t i = 0; i < kTileScalars; ++i)
+        r[i] = static_cast<S>(from[kTileScalars * tile + i]);
+      for_packs<S>([&](int first) {
+        store_tile(z, 0, first,
+                   l.times_inverse(tile, first, load_tile(static_cast<const S*>(r), 0, first)));
+      });
+      for (std::size_t i = 0; i < kTileScalars; ++i)
+        to[kTileScalars * tile + i] = static_cast<T>(z[i]);
     });
   });
 }
@@ -124,8 +258,9 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
 template <class S>
 void FastBackend<S>::move_points(std::span<const BoundPoint> points, int displacement,
                                  std::span<Vec3d> positions) {
-  cpu::move_points(*levels_[0].packed.level, points, levels_[0].vectors[displacement].exact.data(),
-                   positions, threads_);
+  displacements_.resize(3 * levels_[0].patched.packed.size());
+  read(0, displacement, displacements_);
+  cpu::move_points(*levels_[0].patched.level, points, displacements_.data(), positions, threads_);
 }
 
 template <class S>
@@ -136,6 +271,8 @@ void FastBackend<S>::surface_normals(const SurfaceView& surface, std::span<const
 
 template <class S>
 void FastBackend<S>::zero(int level, int x) {
+  if (waiting_ >= 0 && !(waiting_ == level && x == kSolution)) settle();
+  if (waiting_ == level) waiting_ = -1;
   FastVector& vector = levels_[level].vectors[x];
   std::fill(vector.single.begin(), vector.single.end(), 0.0F);
   std::fill(vector.exact.begin(), vector.exact.end(), 0.0);
@@ -144,22 +281,24 @@ void FastBackend<S>::zero(int level, int x) {
 
 template <class S>
 void FastBackend<S>::copy(int level, int from, int to) {
+  settle();
   changed(level, to);
   FastLevel<S>& l = levels_[level];
   with_types(l.vectors[from], l.vectors[to], [&](const auto* a, auto* b) {
     using T = std::decay_t<decltype(*b)>;
-    parallel(3 * l.vertices(), kWorthScalars, [&](std::int32_t i) { b[i] = static_cast<T>(a[i]); });
+    parallel(l.scalars(), kWorthScalars, [&](std::int32_t i) { b[i] = static_cast<T>(a[i]); });
   });
 }
 
 template <class S>
 void FastBackend<S>::combine(int level, double a, int x, double b, int y) {
+  settle();
   changed(level, y);
   FastLevel<S>& l = levels_[level];
   with_types(l.vectors[x], l.vectors[y], [&](const auto* from, auto* to) {
     using T = std::decay_t<decltype(*to)>;
     const T p = static_cast<T>(a), q = static_cast<T>(b);
-    parallel(3 * l.vertices(), kWorthScalars,
+    parallel(l.scalars(), kWorthScalars,
              [&](std::int32_t i) { to[i] = p * static_cast<T>(from[i]) + q * to[i]; });
   });
 }
@@ -168,40 +307,56 @@ void FastBackend<S>::combine(int level, double a, int x, double b, int y) {
 // number of threads.
 template <class S>
 double FastBackend<S>::dot(int level, int x, int y) {
+  settle();
   FastLevel<S>& l = levels_[level];
   double out = 0;
   with_types(l.vectors[x], l.vectors[y],
-             [&](const auto* a, const auto* b) { out = dot_typed(a, b, 3 * l.vertices()); });
+             [&](const auto* a, const auto* b) { out = dot_typed(a, b, l.scalars()); });
   return out;
 }
 
 template <class S>
 void FastBackend<S>::mask(int level, int x) {
+  settle();
   changed(level, x);
   FastLevel<S>& l = levels_[level];
   with_types(l.vectors[x], l.vectors[x], [&](const auto*, auto* values) {
-    parallel(l.vertices(), kWorthVertices,
-             [&](std::int32_t v) { store(values, v, masked(load_vertex(values, v), l.fixed(v))); });
+    for_tiles(0, l.tiles(), [&](std::size_t tile) {
+      using T = std::decay_t<decltype(*values)>;
+      for_packs<T>([&](int first) {
+        store_tile(values, tile, first,
+                   masked(load_tile(static_cast<const T*>(values), tile, first),
+                          l.fixed(tile, first)));
+      });
+    });
   });
 }
 
 template <class S>
 void FastBackend<S>::write(int level, int x, std::span<const double> values) {
+  settle();
   changed(level, x);
   FastLevel<S>& l = levels_[level];
-  expects(values.size() == 3 * l.packed.vertices(), "write: three values per vertex of the level");
+  expects(values.size() == 3 * l.patched.packed.size(),
+          "write: three values per vertex of the level");
   with_types(l.vectors[x], l.vectors[x], [&](const auto*, auto* to) {
     using T = std::decay_t<decltype(*to)>;
-    for (std::size_t i = 0; i < values.size(); ++i) to[i] = static_cast<T>(values[i]);
+    for (std::size_t v = 0; v < l.patched.packed.size(); ++v)
+      for (std::size_t c = 0; c < 3; ++c)
+        to[scalar_of(l.patched.packed[v]) + kGroup * c] = static_cast<T>(values[3 * v + c]);
   });
 }
 
 template <class S>
 void FastBackend<S>::read(int level, int x, std::span<double> values) const {
+  const_cast<FastBackend*>(this)->settle();  // what was asked for before
   const FastLevel<S>& l = levels_[level];
-  expects(values.size() == 3 * l.packed.vertices(), "read: three values per vertex of the level");
+  expects(values.size() == 3 * l.patched.packed.size(),
+          "read: three values per vertex of the level");
   with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
-    std::copy_n(from, values.size(), values.begin());
+    for (std::size_t v = 0; v < l.patched.packed.size(); ++v)
+      for (std::size_t c = 0; c < 3; ++c)
+        values[3 * v + c] = from[scalar_of(l.patched.packed[v]) + kGroup * c];
   });
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/backend.hpp"
-#include "cpu/packed_level.hpp"
+#include "cpu/patch_sweep.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/hex_element.hpp"
@@ -29,11 +29,10 @@ struct PackedMaterial {
   kernels::HexMass<Pack<S>> mass;
 };
 
-/// What the elements of level 0 are made of. A lane without a cell has no stiffness and no mass.
+/// What the elements of level 0 are made of.
 template <class S>
 struct FinestValues {
-  std::vector<S> rotation;               // [group][w x y z][lane]
-  std::vector<S> stiffness, mass, side;  // per lane: E side, density side^3, side
+  std::vector<S> rotation;  // [group][w x y z][lane]
   std::vector<PackedMaterial<S>> materials;
 
   kernels::Quat<Pack<S>> quaternion(std::size_t group, int first_lane) const {
@@ -50,105 +49,87 @@ struct FinestValues {
   }
 };
 
-/// The vertices at the slots of a part of a group: all of it for floats, one half for doubles.
-template <class S>
-void load_slots(const PackedLevel& level, std::size_t group, int first_lane, const S* u,
-                kernels::Vec3<Pack<S>> (&out)[8]) {
-  const std::int32_t* slots = level.slots.data() + 8 * kGroup * group + first_lane;
-  for (int i = 0; i < 8; ++i) out[i] = gather(u, slots + kGroup * i);
+/// Points of a corner of a group: of all its lanes, or of half of them in double.
+inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t group, int first,
+                                          int corner) {
+  return level.corners.data() + 8 * kGroup * group + kGroup * static_cast<std::size_t>(corner) +
+         static_cast<std::size_t>(first);
 }
 
 template <class S>
-void store_records(std::size_t group, int first_lane, const kernels::Vec3<Pack<S>> (&f)[8],
-                   S* records) {
-  S* to = records + 4 * (8 * kGroup * group + static_cast<std::size_t>(first_lane));
-  for (int i = 0; i < 8; ++i) scatter_records(to + 4 * kGroup * i, f[i]);
+void gather_corners(const PatchedLevel& level, std::size_t group, int first, const S* x,
+                    kernels::Vec3<Pack<S>> (&out)[8]) {
+  for (int i = 0; i < 8; ++i) out[i] = gather_points(x, corner_points(level, group, first, i));
 }
-
-/// Calls body(first lane) for each pack of a group.
-template <class S, class Body>
-void for_packs(const Body& body) {
-  for (int first = 0; first < kGroup; first += Pack<S>::kLanes) body(first);
-}
-
-/// Records of A u for a group of level 0.
 template <class S>
-void finest_products(const PackedLevel& level, const FinestValues<S>& values,
-                     const OperatorScale& scale, std::size_t group, const S* u, S* records) {
+void add_corners(const PatchedLevel& level, std::size_t group, int first,
+                 const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
+  for (int i = 0; i < 8; ++i) add_to_points(y, corner_points(level, group, first, i), f[i]);
+}
+
+/// y += A x for a group of level 0.
+template <class S>
+void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
+                     const OperatorScale& scale, std::size_t group, const S* x, S* y) {
   using P = Pack<S>;
-  const PackedMaterial<S>& material = values.materials[level.material[group]];
-  const kernels::FoldCode fold = level.fold[group];
+  const CellKind& kind = level.kinds[level.kind[group]];
+  const PackedMaterial<S>& material = values.materials[kind.material];
+  const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
   for_packs<S>([&](int first) {
-    const std::size_t lane = kGroup * group + static_cast<std::size_t>(first);
-    const auto R = kernels::to_matrix(values.quaternion(group, first));
-    const P stiffness = P(scale.stiffness) * load_pack(values.stiffness.data() + lane);
-    const P mass = P(scale.mass) * load_pack(values.mass.data() + lane);
     kernels::Vec3<P> at[8];
-    load_slots(level, group, first, u, at);
-    if (!kernels::has_hanging(fold)) {
-      kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
-    } else {
-      kernels::Vec3<P> corners[8];
-      kernels::unfold(at, fold, corners);
-      kernels::apply_cell(corners, R, stiffness, mass, material.modes, corners);
-      kernels::fold_transpose(corners, fold, at);
-    }
-    store_records(group, first, at, records);
+    gather_corners(level, group, first, x, at);
+    const auto R = kernels::to_matrix(values.quaternion(group, first));
+    kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
+    add_corners(level, group, first, at, y);
   });
 }
 
-/// Records of A u for a group of a stored level.
+/// y += A x for a group of a stored level.
 template <class S>
-void stored_products(const PackedLevel& level, const S* matrices, std::size_t group, const S* u,
-                     S* records) {
+void stored_products(const PatchedLevel& level, const S* matrices, std::size_t group, const S* x,
+                     S* y) {
   using P = Pack<S>;
   for_packs<S>([&](int first) {
     const S* tile = matrices + kEntries * kGroup * group + first;
     kernels::Vec3<P> at[8], f[8];
-    load_slots(level, group, first, u, at);
+    gather_corners(level, group, first, x, at);
     struct Entries {
       const S* tile;
       P operator[](int entry) const { return load_pack(tile + kGroup * entry); }
     };
     kernels::apply_packed(Entries{tile}, at, f);
-    store_records(group, first, f, records);
+    add_corners(level, group, first, f, y);
   });
 }
 
-/// Records of the elastic force of a group of level 0.
+/// y += the elastic force of a group of level 0 displaced by x.
 template <class S>
-void elastic_records(const PackedLevel& level, const FinestValues<S>& values, std::size_t group,
-                     const S* u, S* records) {
+void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, std::size_t group,
+                    const S* x, S* y) {
   using P = Pack<S>;
-  const kernels::FoldCode fold = level.fold[group];
+  const CellKind& kind = level.kinds[level.kind[group]];
   for_packs<S>([&](int first) {
-    const std::size_t lane = kGroup * group + static_cast<std::size_t>(first);
-    kernels::Vec3<P> at[8], corners[8];
-    load_slots(level, group, first, u, at);
-    kernels::unfold(at, fold, corners);
-    kernels::elastic_force(corners, values.quaternion(group, first),
-                           load_pack(values.side.data() + lane),
-                           load_pack(values.stiffness.data() + lane),
-                           values.materials[level.material[group]].modes.stiffness, corners);
-    kernels::fold_transpose(corners, fold, at);
-    store_records(group, first, at, records);
+    kernels::Vec3<P> at[8];
+    gather_corners(level, group, first, x, at);
+    kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
+                           values.materials[kind.material].modes.stiffness, at);
+    add_corners(level, group, first, at, y);
   });
 }
 
 /// Rotations of a group from the displacements, warm-started. Where Newton proves nothing within
 /// its steps, a lane goes the way of the reference.
 template <class S>
-void rotate_group(const PackedLevel& level, FinestValues<S>& values, std::size_t group,
-                  const S* u) {
+void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_t group,
+                  const S* x) {
   using P = Pack<S>;
   constexpr int kIterations = 8;
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
+  const P side = P(level.kinds[level.kind[group]].side);
   for_packs<S>([&](int first) {
-    const std::size_t lane = kGroup * group + static_cast<std::size_t>(first);
-    kernels::Vec3<P> at[8], corners[8];
-    load_slots(level, group, first, u, at);
-    kernels::unfold(at, level.fold[group], corners);
-    const auto F = kernels::mean_gradient(corners, load_pack(values.side.data() + lane));
+    kernels::Vec3<P> corners[8];
+    gather_corners(level, group, first, x, corners);
+    const auto F = kernels::mean_gradient(corners, side);
     const auto start = values.quaternion(group, first);
     auto q = kernels::normalised(start);
     PackMask<S> proven = {P(S(1)).v < P(S(0)).v}, lost = proven;
@@ -178,6 +159,11 @@ void rotate_group(const PackedLevel& level, FinestValues<S>& values, std::size_t
   });
 }
 
+/// w[i][m]: the value at point i of a child from those at the corners m of its parent.
+struct Weights {
+  float w[8][8];
+};
+
 /// Some cells of level 0, one in each lane: -1 is none.
 template <class S>
 struct FinestLanes {
@@ -188,7 +174,7 @@ struct FinestLanes {
   int material = -1;  // of the cells; -2 where they differ
   std::int32_t cell[P::kLanes];
 
-  FinestLanes(const PackedLevel& level, const FinestValues<S>& values, const OperatorScale& scale,
+  FinestLanes(const PatchedLevel& level, const FinestValues<S>& values, const OperatorScale& scale,
               const std::int32_t* cells) {
     kernels::Quat<P> q;
     for (int k = 0; k < P::kLanes; ++k) {
@@ -201,30 +187,16 @@ struct FinestLanes {
       q.x.set(k, from[kGroup]);
       q.y.set(k, from[2 * kGroup]);
       q.z.set(k, from[3 * kGroup]);
-      stiffness.set(k, static_cast<S>(scale.stiffness) * values.stiffness[lane]);
-      mass.set(k, static_cast<S>(scale.mass) * values.mass[lane]);
-      any_folded = any_folded || kernels::has_hanging(level.fold[group]);
+      const CellKind& kind = level.kinds[level.kind[group]];
+      stiffness.set(k, static_cast<S>(scale.stiffness * kind.stiffness));
+      mass.set(k, static_cast<S>(scale.mass * kind.mass));
+      any_folded = any_folded || kernels::has_hanging(level.level->fold[cell[k]]);
       any_fixed = any_fixed || level.has_fixed[cell[k]] != 0;
-      const int its = level.material[group];
-      material = material == -1 || material == its ? its : -2;
+      material = material == -1 || material == kind.material ? kind.material : -2;
     }
     R = kernels::to_matrix(q);
   }
 };
-
-/// Columns of W, the same in all lanes.
-template <class P>
-kernels::WeightColumns<P> columns_of(const Weights& w) {
-  kernels::WeightColumns<P> out{};
-  for (int m = 0; m < 8; ++m)
-    for (int i = 0; i < 8; ++i) {
-      if (w.w[i][m] == 0) continue;
-      const int at = out.count[m]++;
-      out.child[m][at] = i;
-      out.weight[m][at] = P(w.w[i][m]);
-    }
-  return out;
-}
 
 /// Columns of the W of each lane, with their non-zeros in any lane; null is a lane without a cell.
 template <class P>
@@ -245,6 +217,20 @@ kernels::WeightColumns<P> columns_of(const Weights* const (&w)[P::kLanes]) {
       out.weight[m][at] = load_pack(weight);
     }
   return out;
+}
+
+/// Columns of the fold of each lane: its corners from its slots.
+template <class P>
+kernels::WeightColumns<P> fold_columns(const PatchedLevel& level, const std::int32_t* cells) {
+  Weights fold[P::kLanes];
+  const Weights* w[P::kLanes];
+  for (int k = 0; k < P::kLanes; ++k) {
+    w[k] = nullptr;
+    if (cells[k] < 0) continue;
+    kernels::fold_weights(level.level->fold[cells[k]], fold[k].w);
+    w[k] = &fold[k];
+  }
+  return columns_of<P>(w);
 }
 
 /// sum += W^T A W, A given in full.
@@ -282,7 +268,7 @@ void corner_matrices(const PackedMaterial<S>& m, const FinestLanes<S>& lanes,
 
 /// The same where lanes may be of several materials.
 template <class S>
-void corner_matrices(const PackedLevel& level, const FinestValues<S>& values,
+void corner_matrices(const PatchedLevel& level, const FinestValues<S>& values,
                      const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
   if (lanes.material != -2) {
     const auto material = static_cast<std::size_t>(std::max(lanes.material, 0));
@@ -293,8 +279,7 @@ void corner_matrices(const PackedLevel& level, const FinestValues<S>& values,
     corner_matrices(values.materials[m], lanes, some);
     for (int k = 0; k < Pack<S>::kLanes; ++k) {
       const bool none = lanes.cell[k] < 0;
-      if (!none &&
-          level.material[static_cast<std::size_t>(level.lane[lanes.cell[k]]) / kGroup] != m)
+      if (!none && level.kinds[level.kind[level.lane[lanes.cell[k]] / kGroup]].material != m)
         continue;
       for (int i = 0; i < 24; ++i)
         for (int j = 0; j < 24; ++j) full[i][j].set(k, some[i][j][k]);
@@ -302,26 +287,17 @@ void corner_matrices(const PackedLevel& level, const FinestValues<S>& values,
   }
 }
 
-/// Brings matrices of cells of level 0 from corners to slots.
-template <class S>
-void fold_matrices(const PackedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
-  using P = Pack<S>;
-  Weights fold[P::kLanes];
-  const Weights* w[P::kLanes];
-  for (int k = 0; k < P::kLanes; ++k) {
-    w[k] = nullptr;
-    if (lanes.cell[k] < 0) continue;
-    kernels::fold_weights(level.level->fold[lanes.cell[k]], fold[k].w);
-    w[k] = &fold[k];
-  }
+/// Brings matrices of some cells from corners to slots.
+template <class P>
+void fold_matrices(const PatchedLevel& level, const std::int32_t* cells, P (&full)[24][24]) {
   P sum[kEntries] = {};
-  add_product(full, columns_of<P>(w), sum);
+  add_product(full, fold_columns<P>(level, cells), sum);
   kernels::expand_packed(static_cast<const P*>(sum), full);
 }
 
 /// Zero in the rows and columns of held components. Needs  matrices over slots.
 template <class S>
-void mask_matrices(const PackedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
+void mask_matrices(const PatchedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
   Pack<S> keep[24];
   for (int i = 0; i < 24; ++i) {
     S of[Pack<S>::kLanes];
@@ -339,7 +315,7 @@ void mask_matrices(const PackedLevel& level, const FinestLanes<S>& lanes, Pack<S
 
 /// Matrices of some cells of a stored level, in full; zero where there is no cell.
 template <class S>
-void stored_matrices(const PackedLevel& level, const S* matrices, const std::int32_t* cells,
+void stored_matrices(const PatchedLevel& level, const S* matrices, const std::int32_t* cells,
                      Pack<S> (&full)[24][24]) {
   using P = Pack<S>;
   P packed[kEntries] = {};
@@ -352,51 +328,60 @@ void stored_matrices(const PackedLevel& level, const S* matrices, const std::int
   kernels::expand_packed(static_cast<const P*>(packed), full);
 }
 
-/// Writes a symmetric block a lane as two records.
+/// Symmetric blocks of points, as two records.
 template <class S>
-void store_blocks(std::size_t group, int first_lane, int slot, const kernels::Sym3<Pack<S>>& b,
-                  S* blocks) {
+struct BlockPoints {
+  S *upper, *lower;  // xx xy xz, yy yz zz
+
+  void add(const std::uint16_t* points, const kernels::Sym3<Pack<S>>& b) const {
+    add_to_points(upper, points, kernels::Vec3<Pack<S>>{b.xx, b.xy, b.xz});
+    add_to_points(lower, points, kernels::Vec3<Pack<S>>{b.yy, b.yz, b.zz});
+  }
+};
+
+/// Diagonal blocks of a folded group at its slots, from its matrices over corners.
+template <class S>
+void add_folded_diagonals(const PatchedLevel& level, std::size_t group, int first,
+                          const Pack<S> (&full)[24][24], const BlockPoints<S>& to) {
   using P = Pack<S>;
-  S rows[2][4 * P::kLanes];
-  scatter_records(rows[0], {b.xx, b.xy, b.xz});
-  scatter_records(rows[1], {b.yy, b.yz, b.zz});
-  S* to = blocks + 8 * (8 * kGroup * group + static_cast<std::size_t>(kGroup * slot + first_lane));
-  for (int k = 0; k < P::kLanes; ++k)
-    for (int r = 0; r < 2; ++r)
-      for (int c = 0; c < 4; ++c) to[8 * k + 4 * r + c] = rows[r][4 * k + c];
+  const std::int32_t* cells = level.cell.data() + kGroup * group + first;
+  const auto columns = fold_columns<P>(level, cells);
+  P strip[3][24];
+  for (int slot = 0; slot < 8; ++slot) {
+    if (columns.count[slot] == 0) continue;
+    kernels::gather_strip(full, columns, slot, strip);
+    const kernels::Mat3<P> block = kernels::gather_block(strip, columns, slot);
+    to.add(level.slots.data() + 64 * static_cast<std::size_t>(level.slots_at[group]) +
+               kGroup * slot + first,
+           kernels::lower_triangle(block));
+  }
 }
 
-/// Diagonal blocks at the slots of a group of level 0.
+/// Diagonal blocks at the vertices of a group of level 0.
 template <class S>
-void finest_diagonals(const PackedLevel& level, const FinestValues<S>& values,
-                      const OperatorScale& scale, std::size_t group, S* blocks) {
+void add_finest_diagonals(const PatchedLevel& level, const FinestValues<S>& values,
+                          const OperatorScale& scale, std::size_t group, const BlockPoints<S>& to) {
   using P = Pack<S>;
-  const PackedMaterial<S>& m = values.materials[level.material[group]];
-  const kernels::FoldCode fold = level.fold[group];
-  double w[8][8];
-  kernels::fold_weights(fold, w);
   for_packs<S>([&](int first) {
-    const std::size_t lane = kGroup * group + static_cast<std::size_t>(first);
-    const auto R = kernels::to_matrix(values.quaternion(group, first));
-    const P stiffness = P(scale.stiffness) * load_pack(values.stiffness.data() + lane);
-    const P mass = P(scale.mass) * load_pack(values.mass.data() + lane);
-    for (int slot = 0; slot < 8; ++slot) {
-      kernels::Mat3<P> sum;
-      for (int i = 0; i < 8; ++i)
-        for (int j = 0; j < 8; ++j) {
-          const double both = w[i][slot] * w[j][slot];
-          if (both != 0)
-            sum += kernels::rotate_block(m.stiffness, m.mass, R, P(both) * stiffness,
-                                         P(both) * mass, i, j);
-        }
-      store_blocks(group, first, slot, kernels::lower_triangle(sum), blocks);
+    const FinestLanes<S> lanes(level, values, scale, level.cell.data() + kGroup * group + first);
+    const CellKind& kind = level.kinds[level.kind[group]];
+    const PackedMaterial<S>& m = values.materials[kind.material];
+    if (level.folded[group] != 0) {
+      P full[24][24];
+      corner_matrices(m, lanes, full);
+      add_folded_diagonals(level, group, first, full, to);
+      return;
     }
+    for (int i = 0; i < 8; ++i)
+      to.add(corner_points(level, group, first, i),
+             kernels::cell_diagonal(m.stiffness, m.mass, lanes.R, lanes.stiffness, lanes.mass, i));
   });
 }
 
-/// Diagonal blocks at the slots of a group of a stored level.
+/// The same for a group of a stored level.
 template <class S>
-void stored_diagonals(const S* matrices, std::size_t group, S* blocks) {
+void add_stored_diagonals(const PatchedLevel& level, const S* matrices, std::size_t group,
+                          const BlockPoints<S>& to) {
   using P = Pack<S>;
   for_packs<S>([&](int first) {
     const S* tile = matrices + kEntries * kGroup * group + first;
@@ -404,9 +389,43 @@ void stored_diagonals(const S* matrices, std::size_t group, S* blocks) {
       const S* tile;
       P operator[](int entry) const { return load_pack(tile + kGroup * entry); }
     };
-    for (int slot = 0; slot < 8; ++slot)
-      store_blocks(group, first, slot, kernels::packed_diagonal<P>(Entries{tile}, slot), blocks);
+    if (level.folded[group] != 0) {
+      P full[24][24];
+      kernels::expand_packed(Entries{tile}, full);
+      add_folded_diagonals(level, group, first, full, to);
+      return;
+    }
+    for (int i = 0; i < 8; ++i)
+      to.add(corner_points(level, group, first, i), kernels::packed_diagonal<P>(Entries{tile}, i));
   });
+}
+
+/// w[i][m]: the value at slot i of a cell from those at its corners m, the inverse of its fold: what
+/// lies beyond the cell is extrapolated from its own octant.
+inline void unfold_weights(kernels::FoldCode code, float (&w)[8][8]) {
+  const int o = kernels::fold_octant(code);
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j < 8; ++j) {
+      if (!kernels::is_hanging(code, i)) {
+        w[i][j] = i == j ? 1 : 0;
+        continue;
+      }
+      const int far = kernels::mode_axes(j ^ o), all = kernels::mode_axes(i ^ o);
+      const int sign = (all - far) % 2 == 0 ? 1 : -1;
+      w[i][j] = kernels::is_between(o, i, j) ? static_cast<float>(sign * (1 << far)) : 0;
+    }
+}
+
+/// Points of a child from the corners of its parent: its corners, or its slots.
+inline Weights child_weights(const Level& level, std::int32_t child, bool slots) {
+  Weights out;
+  const int place = level.place[child];
+  if (place == kernels::kPassed && slots)
+    unfold_weights(level.fold[child], out.w);
+  else
+    kernels::transfer_weights(slots ? level.fold[child] : kernels::FoldCode{0}, place,
+                              kernels::FoldCode{0}, out.w);
+  return out;
 }
 
 }  // namespace kerf::cpu

@@ -15,25 +15,18 @@
 #include "core/base/error.hpp"
 #include "core/solve/sparse_cholesky.hpp"
 #include "cpu/fast_kernels.hpp"
-#include "cpu/packed_level.hpp"
+#include "cpu/patch_sweep.hpp"
 
 namespace kerf::cpu {
 
 using kernels::Vec3;
 
-inline constexpr std::int32_t kChunk = 512;  // vertices whose norms are summed together
+inline constexpr std::int32_t kChunk = 512;  // scalars a lane that a dot product sums together
 
 template <class T>
 std::size_t bytes_of(const std::vector<T>& array) {
   return array.capacity() * sizeof(T);
 }
-
-/// A record: what one cell adds to one vertex, and a fourth scalar that is zero.
-template <class S>
-struct Record {
-  typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
-  Vector v{};
-};
 
 /// A vector of one level, of the scalars of the cycle or exact.
 struct FastVector {
@@ -64,38 +57,29 @@ void with_types(From& from, To& to, const Body& body) {
 
 template <class S>
 struct FastLevel {
-  PackedLevel packed;
-  std::vector<S> matrices;                               // [group][300][8], levels above 0
-  std::vector<S> inverse_diagonal;                       // six a vertex: xx xy xz yy yz zz
-  std::vector<kernels::WeightColumns<Pack<S>>> columns;  // of the weights to the next level
-  std::vector<FastVector> vectors;                       // by VectorId
-  double bound = 0;                                      // of the spectrum of D^-1 A
+  PatchedLevel patched;
+  std::vector<S> matrices;          // [group][300][8], levels above 0
+  std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][8]
+  std::vector<FastVector> vectors;  // by VectorId
+  double bound = 0;                 // of the spectrum of D^-1 A
   bool solution_is_zero = false;
 
-  std::int32_t vertices() const { return packed.level->vertices(); }
-  std::int32_t groups() const { return static_cast<std::int32_t>(packed.groups()); }
-  std::uint8_t fixed(std::int32_t v) const { return packed.level->fixed[v]; }
+  std::int32_t tiles() const { return static_cast<std::int32_t>(patched.tiles()); }
+  std::int32_t scalars() const { return 3 * kGroup * tiles(); }
+  const std::uint8_t* fixed(std::size_t tile, int first) const {
+    return patched.fixed.data() + kGroup * tile + first;
+  }
   S* at(int x) { return vectors[x].template in<S>().data(); }
-};
 
-template <class S>
-Vec3<S> masked(Vec3<S> v, std::uint8_t fixed) {
-  for (int c = 0; c < 3; ++c)
-    if ((fixed >> c) & 1) v[c] = 0;
-  return v;
-}
-template <class S>
-Vec3<S> load_vertex(const S* x, std::int32_t v) {
-  const S* at = x + 3 * static_cast<std::size_t>(v);
-  return {at[0], at[1], at[2]};
-}
-template <class S>
-void store(S* x, std::int32_t v, const Vec3<S>& value) {
-  S* at = x + 3 * static_cast<std::size_t>(v);
-  at[0] = value.x;
-  at[1] = value.y;
-  at[2] = value.z;
-}
+  /// D^-1 r of the vertices of a tile.
+  Vec3<Pack<S>> times_inverse(std::size_t tile, int first, const Vec3<Pack<S>>& r) const {
+    const S* d = inverse_diagonal.data() + 2 * kTileScalars * tile + first;
+    const auto entry = [&](int e) { return load_pack(d + kGroup * e); };
+    const Pack<S> xy = entry(1), xz = entry(2), yz = entry(4);
+    return {fma(entry(0), r.x, fma(xy, r.y, xz * r.z)), fma(xy, r.x, fma(entry(3), r.y, yz * r.z)),
+            fma(xz, r.x, fma(yz, r.y, entry(5) * r.z))};
+  }
+};
 
 /// S: scalar of the cycle. Vectors that are added on level 0 are double, and so are forces.
 template <class S>
@@ -154,29 +138,38 @@ class FastBackend final : public Backend {
 #pragma omp parallel for num_threads(threads_) schedule(static) if (count >= worth)
     for (std::int32_t i = 0; i < count; ++i) body(i);
   }
-  static constexpr std::int32_t kWorthMatrices = 8;  // groups whose matrices are made
-  static constexpr std::int32_t kWorthGroups = 64;
-  static constexpr std::int32_t kWorthVertices = 4096;
+  /// body(tile), for tiles of vertices.
+  template <class Body>
+  void for_tiles(std::int32_t begin, std::int32_t end, const Body& body) const {
+#pragma omp parallel for num_threads(threads_) schedule(static) if (end - begin >= kWorthTiles)
+    for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
+  }
+  static constexpr std::int32_t kWorthGroups = 8;  // whose matrices are made
+  static constexpr std::int32_t kWorthTiles = 512;
   static constexpr std::int32_t kWorthScalars = 65536;
 
-  void allocate(FastVector& vector, std::int32_t vertices, bool exact) const;
-  void fill_values(const Hierarchy& hierarchy);
+  void allocate(FastVector& vector, const PatchedLevel& level, bool exact) const;
   void round_rotations();
   template <class T>
   const FinestValues<T>& values_of() const;
   template <class T>
-  T* records(int level);
+  T* partial_sums(std::size_t scalars);
+  template <class T, class Before, class Own, class Cells, class Finish>
+  double sweep(int level, const Before& before, const Own& own, const T* u, const Cells& cells,
+               const Finish& finish);
   template <class T>
-  Vec3<T> sum_records(const PackedLevel& packed, const T* all, std::int32_t v) const;
+  void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
+                    T* y) const;
   template <class T>
-  const T* products(int level, const OperatorScale& scale, const T* u);
-  template <class T>
-  void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
+  double apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
   template <class A, class B>
   double dot_typed(const A* a, const B* b, std::int32_t size) const;
   void add_children(const FastLevel<S>& from, bool finest,
                     const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
   void chebyshev(int level);
+  void load_coarse_records(int coarse);
+  Vec3<Pack<S>> correction(const FastLevel<S>& to, std::size_t tile, int first) const;
+  void settle();
   void expects_exact(int in, int out) const {
     ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
   }
@@ -193,8 +186,11 @@ class FastBackend final : public Backend {
   FinestValues<S> single_;      // the same, rounded; empty if S is double
   std::vector<FastLevel<S>> levels_;
   int vectors_on_finest_ = kLevelVectors;
-  std::vector<double> records_;
-  std::vector<Vec3d> faces_;  // of the surface: area normals
+  std::vector<double> partial_;    // sums of shared vertices, by copy; of the scalars of the sweep
+  std::vector<S> coarse_records_;  // the solution of a coarse level as points
+  int waiting_ = -1;               // level whose solution is still to be corrected
+  std::vector<Vec3d> faces_;           // of the surface: area normals
+  std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
 };
@@ -210,39 +206,63 @@ const FinestValues<T>& FastBackend<S>::values_of() const {
 
 template <class S>
 template <class T>
-T* FastBackend<S>::records(int level) {
-  const std::size_t scalars = 4 * 8 * levels_[level].packed.cell.size();
-  records_.resize(std::max(records_.size(), scalars * sizeof(T) / sizeof(double) + 1));
-  return reinterpret_cast<T*>(records_.data());
+T* FastBackend<S>::partial_sums(std::size_t scalars) {
+  partial_.resize(std::max(partial_.size(), scalars * sizeof(T) / sizeof(double) + 1));
+  return reinterpret_cast<T*>(partial_.data());
 }
 
+/// One pass over the cells of a level, from the vector u to what finish makes of the sums.
+/// before(tile): shared tiles, first of all, in any order. own, cells, finish: see PatchPoints; cells
+/// gets (group, x, y). finish of a shared tile reads x from u. Returns the sum of what finish
+/// returns, in an order that threads do not change.
 template <class S>
-template <class T>
-Vec3<T> FastBackend<S>::sum_records(const PackedLevel& packed, const T* all, std::int32_t v) const {
-  typename Record<T>::Vector sum{};
-  for (std::int32_t k = packed.level->incidence_begin[v]; k < packed.level->incidence_begin[v + 1];
-       ++k) {
-    typename Record<T>::Vector one;
-    __builtin_memcpy(&one, all + 4 * static_cast<std::size_t>(packed.record[k]), sizeof one);
-    sum += one;
-  }
-  return {sum[0], sum[1], sum[2]};
-}
-
-template <class S>
-template <class T>
-const T* FastBackend<S>::products(int level, const OperatorScale& scale, const T* u) {
-  FastLevel<S>& l = levels_[level];
-  T* out = records<T>(level);
-  parallel(l.groups(), kWorthGroups, [&](std::int32_t g) {
-    const auto group = static_cast<std::size_t>(g);
-    if (level == 0) {
-      finest_products(l.packed, values_of<T>(), scale, group, u, out);
-    } else if constexpr (std::is_same_v<T, S>) {
-      stored_products(l.packed, l.matrices.data(), group, u, out);
+template <class T, class Before, class Own, class Cells, class Finish>
+double FastBackend<S>::sweep(int level, const Before& before, const Own& own, const T* u,
+                             const Cells& cells, const Finish& finish) {
+  const PatchedLevel& l = levels_[level].patched;
+  const auto patches = static_cast<std::int32_t>(l.patches.size());
+  const std::int32_t first_shared = l.first_shared / kGroup, tiles = levels_[level].tiles();
+  T* const partial = partial_sums<T>(4 * l.copy_point.size());
+  std::vector<double> sums(l.patches.size() + static_cast<std::size_t>(tiles - first_shared));
+#pragma omp parallel num_threads(threads_) if (patches > 1)
+  {
+#pragma omp for schedule(static)
+    for (std::int32_t t = first_shared; t < tiles; ++t) before(static_cast<std::size_t>(t));
+#pragma omp for schedule(dynamic, 1)
+    for (std::int32_t p = 0; p < patches; ++p) {
+      const Patch& patch = l.patches[p];
+      PatchPoints<T> points(l, patch);
+      points.load(own, u);
+      for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g)
+        cells(static_cast<std::size_t>(g), points.x(), points.y());
+      sums[p] = points.store(finish, partial);
     }
-  });
-  return out;
+#pragma omp for schedule(static)
+    for (std::int32_t t = first_shared; t < tiles; ++t) {
+      const auto tile = static_cast<std::size_t>(t);
+      double sum = 0;
+      for_packs<T>([&](int first) {
+        sum += finish(tile, first, shared_sums(l, tile, first, partial),
+                      [&] { return load_tile(u, tile, first); });
+      });
+      sums[l.patches.size() + static_cast<std::size_t>(t - first_shared)] = sum;
+    }
+  }
+  double sum = 0;
+  for (const double one : sums) sum += one;
+  return sum;
+}
+
+template <class S>
+template <class T>
+void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::size_t group,
+                                  const T* x, T* y) const {
+  const FastLevel<S>& l = levels_[level];
+  if (level == 0) {
+    finest_products(l.patched, values_of<T>(), scale, group, x, y);
+  } else if constexpr (std::is_same_v<T, S>) {
+    stored_products(l.patched, l.matrices.data(), group, x, y);
+  }
 }
 
 template <class S>

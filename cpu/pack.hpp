@@ -119,6 +119,12 @@ inline Pack<double> sqrt(const Pack<double>& a) {
 #endif
 }
 
+/// Three components of one point, and a fourth scalar that is zero.
+template <class S>
+struct Record {
+  typedef S Vector __attribute__((vector_size(4 * sizeof(S))));
+};
+
 template <class S>
 Pack<S> load_pack(const S* from) {
   Pack<S> out;
@@ -130,14 +136,14 @@ void store_pack(S* to, const Pack<S>& pack) {
   __builtin_memcpy(to, &pack.v, sizeof pack.v);
 }
 
-/// One vector of each lane's vertex. Vectors are 3 scalars apart; the array has one scalar more
-/// than they need, since four are read.
-inline kernels::Vec3<Pack<float>> gather(const float* x, const std::int32_t* vertex) {
+// Points are records of four scalars, the fourth of them zero, aligned to their size.
+
+/// One vector of each lane's point.
+inline kernels::Vec3<Pack<float>> gather_points(const float* x, const std::uint16_t* at) {
 #if defined(__AVX2__) && defined(__FMA__)
   const auto pair = [&](int low, int high) {
-    return _mm256_insertf128_ps(
-        _mm256_castps128_ps256(_mm_loadu_ps(x + 3 * std::size_t(vertex[low]))),
-        _mm_loadu_ps(x + 3 * std::size_t(vertex[high])), 1);
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(x + 4 * std::size_t(at[low]))),
+                                _mm_load_ps(x + 4 * std::size_t(at[high])), 1);
   };
   const __m256 a = pair(0, 4), b = pair(1, 5), c = pair(2, 6), d = pair(3, 7);
   const __m256 ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
@@ -148,16 +154,16 @@ inline kernels::Vec3<Pack<float>> gather(const float* x, const std::int32_t* ver
 #else
   kernels::Vec3<Pack<float>> out;
   for (int i = 0; i < 8; ++i)
-    for (int c = 0; c < 3; ++c) out[c].set(i, x[3 * std::size_t(vertex[i]) + std::size_t(c)]);
+    for (int c = 0; c < 3; ++c) out[c].set(i, x[4 * std::size_t(at[i]) + std::size_t(c)]);
   return out;
 #endif
 }
-inline kernels::Vec3<Pack<double>> gather(const double* x, const std::int32_t* vertex) {
+inline kernels::Vec3<Pack<double>> gather_points(const double* x, const std::uint16_t* at) {
 #if defined(__AVX2__) && defined(__FMA__)
-  const __m256d a = _mm256_loadu_pd(x + 3 * std::size_t(vertex[0]));
-  const __m256d b = _mm256_loadu_pd(x + 3 * std::size_t(vertex[1]));
-  const __m256d c = _mm256_loadu_pd(x + 3 * std::size_t(vertex[2]));
-  const __m256d d = _mm256_loadu_pd(x + 3 * std::size_t(vertex[3]));
+  const __m256d a = _mm256_load_pd(x + 4 * std::size_t(at[0]));
+  const __m256d b = _mm256_load_pd(x + 4 * std::size_t(at[1]));
+  const __m256d c = _mm256_load_pd(x + 4 * std::size_t(at[2]));
+  const __m256d d = _mm256_load_pd(x + 4 * std::size_t(at[3]));
   const __m256d ab_low = _mm256_unpacklo_pd(a, b), ab_high = _mm256_unpackhi_pd(a, b);
   const __m256d cd_low = _mm256_unpacklo_pd(c, d), cd_high = _mm256_unpackhi_pd(c, d);
   using V = Pack<double>::Vector;
@@ -167,47 +173,61 @@ inline kernels::Vec3<Pack<double>> gather(const double* x, const std::int32_t* v
 #else
   kernels::Vec3<Pack<double>> out;
   for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 3; ++c) out[c].set(i, x[3 * std::size_t(vertex[i]) + std::size_t(c)]);
+    for (int c = 0; c < 3; ++c) out[c].set(i, x[4 * std::size_t(at[i]) + std::size_t(c)]);
   return out;
 #endif
 }
 
-/// Writes the lanes as records of four scalars one after the other; the fourth is zero.
-inline void scatter_records(float* to, const kernels::Vec3<Pack<float>>& f) {
+/// Calls body(lane, record) for the vectors of the lanes, as records, in the order of the lanes.
+template <class Body>
+void for_records(const kernels::Vec3<Pack<float>>& f, const Body& body) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256 x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_ps();
   const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
   const __m256 z0_low = _mm256_unpacklo_ps(z, zero), z0_high = _mm256_unpackhi_ps(z, zero);
-  const __m256 r04 = _mm256_shuffle_ps(xy_low, z0_low, 0x44);
-  const __m256 r15 = _mm256_shuffle_ps(xy_low, z0_low, 0xEE);
-  const __m256 r26 = _mm256_shuffle_ps(xy_high, z0_high, 0x44);
-  const __m256 r37 = _mm256_shuffle_ps(xy_high, z0_high, 0xEE);
-  _mm256_storeu_ps(to, _mm256_permute2f128_ps(r04, r15, 0x20));
-  _mm256_storeu_ps(to + 8, _mm256_permute2f128_ps(r26, r37, 0x20));
-  _mm256_storeu_ps(to + 16, _mm256_permute2f128_ps(r04, r15, 0x31));
-  _mm256_storeu_ps(to + 24, _mm256_permute2f128_ps(r26, r37, 0x31));
+  const __m256 r[4] = {
+      _mm256_shuffle_ps(xy_low, z0_low, 0x44), _mm256_shuffle_ps(xy_low, z0_low, 0xEE),
+      _mm256_shuffle_ps(xy_high, z0_high, 0x44), _mm256_shuffle_ps(xy_high, z0_high, 0xEE)};
+  using R = Record<float>::Vector;
+  for (int i = 0; i < 4; ++i) body(i, R(_mm256_castps256_ps128(r[i])));
+  for (int i = 0; i < 4; ++i) body(i + 4, R(_mm256_extractf128_ps(r[i], 1)));
 #else
-  for (int i = 0; i < 8; ++i) {
-    for (int c = 0; c < 3; ++c) to[4 * i + c] = f[c][i];
-    to[4 * i + 3] = 0;
-  }
+  for (int i = 0; i < 8; ++i) body(i, Record<float>::Vector{f.x[i], f.y[i], f.z[i], 0});
 #endif
 }
-inline void scatter_records(double* to, const kernels::Vec3<Pack<double>>& f) {
+template <class Body>
+void for_records(const kernels::Vec3<Pack<double>>& f, const Body& body) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256d x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_pd();
   const __m256d xy_low = _mm256_unpacklo_pd(x, y), xy_high = _mm256_unpackhi_pd(x, y);
   const __m256d z0_low = _mm256_unpacklo_pd(z, zero), z0_high = _mm256_unpackhi_pd(z, zero);
-  _mm256_storeu_pd(to, _mm256_permute2f128_pd(xy_low, z0_low, 0x20));
-  _mm256_storeu_pd(to + 4, _mm256_permute2f128_pd(xy_high, z0_high, 0x20));
-  _mm256_storeu_pd(to + 8, _mm256_permute2f128_pd(xy_low, z0_low, 0x31));
-  _mm256_storeu_pd(to + 12, _mm256_permute2f128_pd(xy_high, z0_high, 0x31));
+  using R = Record<double>::Vector;
+  body(0, R(_mm256_permute2f128_pd(xy_low, z0_low, 0x20)));
+  body(1, R(_mm256_permute2f128_pd(xy_high, z0_high, 0x20)));
+  body(2, R(_mm256_permute2f128_pd(xy_low, z0_low, 0x31)));
+  body(3, R(_mm256_permute2f128_pd(xy_high, z0_high, 0x31)));
 #else
-  for (int i = 0; i < 4; ++i) {
-    for (int c = 0; c < 3; ++c) to[4 * i + c] = f[c][i];
-    to[4 * i + 3] = 0;
-  }
+  for (int i = 0; i < 4; ++i) body(i, Record<double>::Vector{f.x[i], f.y[i], f.z[i], 0});
 #endif
+}
+
+template <class S>
+void put_points(S* x, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& v) {
+  for_records(v, [&](int lane, typename Record<S>::Vector record) {
+    __builtin_memcpy(x + 4 * std::size_t(at[lane]), &record, sizeof record);
+  });
+}
+
+/// In the order of the lanes, which may meet in a point.
+template <class S>
+void add_to_points(S* x, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& v) {
+  for_records(v, [&](int lane, typename Record<S>::Vector record) {
+    S* to = x + 4 * std::size_t(at[lane]);
+    typename Record<S>::Vector sum;
+    __builtin_memcpy(&sum, to, sizeof sum);
+    sum += record;
+    __builtin_memcpy(to, &sum, sizeof sum);
+  });
 }
 
 }  // namespace kerf::cpu

@@ -193,7 +193,7 @@ KERF_HD void swap_yz_if(const Mask& mask, Sym3<T>& a) {
 /// Needs   A finite and positive semi-definite up to rounding.
 template <class T>
 KERF_HD Sym3<T> inverse_semidefinite(Sym3<T> A) {
-  const T least = T(32) * Precision<T>::kEpsilon * (A.xx + A.yy + A.zz);
+  const T least = T(32 * Precision<T>::kEpsilon) * (A.xx + A.yy + A.zz);
   const auto reciprocal = [least](const T& pivot) {
     const auto kept = pivot > least;
     return select(kept, T(1) / select(kept, pivot, T(1)), T(0));

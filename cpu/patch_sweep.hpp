@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+//
+// Products with the matrices of a patch, from vectors to vectors: copies the points of the patch,
+// lets the cells add to them, and hands each vertex its sum while it is in registers.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <new>
+#include <vector>
+
+#include "cpu/patched_level.hpp"
+
+namespace kerf::cpu {
+
+/// Scalars of the points of one patch, aligned for whole packs. Grows, never shrinks.
+template <class S>
+class PointBuffer {
+ public:
+  PointBuffer() = default;
+  PointBuffer(const PointBuffer&) = delete;
+  PointBuffer& operator=(const PointBuffer&) = delete;
+  ~PointBuffer() { ::operator delete(data_, kAlign); }
+
+  S* reserve(std::size_t scalars) {
+    if (scalars <= size_) return data_;
+    ::operator delete(data_, kAlign);
+    data_ = nullptr;
+    size_ = 0;
+    data_ = static_cast<S*>(::operator new(scalars * sizeof(S), kAlign));
+    size_ = scalars;
+    return data_;
+  }
+
+ private:
+  static constexpr std::align_val_t kAlign{64};
+  S* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+template <class S>
+Pack<S> tile_pack(const S* x, std::size_t tile, int component, int first) {
+  return load_pack(x + kTileScalars * tile + kGroup * component + first);
+}
+
+/// The vectors of a tile, or of half of it in double.
+template <class S>
+kernels::Vec3<Pack<S>> load_tile(const S* x, std::size_t tile, int first) {
+  return {tile_pack(x, tile, 0, first), tile_pack(x, tile, 1, first), tile_pack(x, tile, 2, first)};
+}
+template <class S>
+void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>& v) {
+  S* to = x + kTileScalars * tile + first;
+  store_pack(to, v.x);
+  store_pack(to + kGroup, v.y);
+  store_pack(to + 2 * kGroup, v.z);
+}
+
+/// Zero where a component is held.
+template <class S>
+kernels::Vec3<Pack<S>> masked(kernels::Vec3<Pack<S>> v, const std::uint8_t* fixed) {
+  std::uint64_t any = 0;
+  std::memcpy(&any, fixed, Pack<S>::kLanes);
+  if (any == 0) return v;
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    for (int c = 0; c < 3; ++c)
+      if ((fixed[k] >> c) & 1) v[c].set(k, S(0));
+  return v;
+}
+
+/// Calls body(first lane) for each pack of a group.
+template <class S, class Body>
+void for_packs(const Body& body) {
+  for (int first = 0; first < kGroup; first += Pack<S>::kLanes) body(first);
+}
+
+/// The points of one patch: x, which the cells read, and y, to which they add.
+template <class S>
+class PatchPoints {
+ public:
+  using P = Pack<S>;
+
+  PatchPoints(const PatchedLevel& level, const Patch& patch) : level_(level), patch_(patch) {
+    thread_local PointBuffer<S> x, y;
+    const std::size_t scalars = 4 * static_cast<std::size_t>(patch.points);
+    x_ = x.reserve(scalars);
+    y_ = y.reserve(scalars);
+  }
+
+  const S* x() const { return x_; }
+  S* y() const { return y_; }
+
+  /// own(tile, first lane): the vectors of vertices of this patch alone; shared vertices from u.
+  template <class Own>
+  void load(const Own& own, const S* u) {
+    const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
+    for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
+      for_packs<S>([&](int first) {
+        put_points(x_, own_points(at, first), own(at, first));
+      });
+    for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k) {
+      const S* from = u + scalar_of(level_.copy_vertex[k]);
+      S* to = x_ + 4 * std::size_t(level_.copy_point[k]);
+      to[0] = from[0];
+      to[1] = from[kGroup];
+      to[2] = from[2 * kGroup];
+      to[3] = 0;
+    }
+    interpolate_hanging();
+    std::fill_n(x_ + 4 * std::size_t(patch_.points - 1), 4, S(0));
+    std::fill_n(y_, 4 * std::size_t(patch_.points), S(0));
+  }
+
+  /// finish(tile, first lane, sum, value): what the cells added to vertices of this patch alone,
+  /// and a function for the x they had; shared vertices to `partial`, by copy. Returns the sum of
+  /// what finish returns, in a fixed order.
+  template <class Finish>
+  double store(const Finish& finish, S* partial) {
+    gather_hanging();
+    double sum = 0;
+    const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
+    for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
+      for_packs<S>([&](int first) {
+        const std::uint16_t* points = own_points(at, first);
+        sum += finish(at, first, gather_points(y_, points),
+                      [&] { return gather_points(static_cast<const S*>(x_), points); });
+      });
+    for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k)
+      std::memcpy(partial + 4 * std::size_t(k), y_ + 4 * std::size_t(level_.copy_point[k]),
+                  4 * sizeof(S));
+    return sum;
+  }
+
+ private:
+  using R = typename Record<S>::Vector;
+  static R read(const S* x, std::size_t point) {
+    R out;
+    __builtin_memcpy(&out, x + 4 * point, sizeof out);
+    return out;
+  }
+  static void write(S* x, std::size_t point, const R& r) {
+    __builtin_memcpy(x + 4 * point, &r, sizeof r);
+  }
+  std::size_t first_tile() const { return static_cast<std::size_t>(patch_.first_own / kGroup); }
+  const std::uint16_t* own_points(std::size_t tile, int first) const {
+    return level_.own_point.data() + kGroup * tile + first;
+  }
+
+  void interpolate_hanging() {
+    for (std::int32_t h = 0; h < patch_.hanging; ++h) {
+      const auto& m = level_.hanging_masters[patch_.first_hanging + h];
+      write(x_, std::size_t(patch_.hanging_point + h),
+            S(0.25) * ((read(x_, m[0]) + read(x_, m[1])) + (read(x_, m[2]) + read(x_, m[3]))));
+    }
+  }
+  void gather_hanging() {
+    for (std::int32_t h = 0; h < patch_.hanging; ++h) {
+      const R share = S(0.25) * read(y_, std::size_t(patch_.hanging_point + h));
+      for (const std::uint16_t m : level_.hanging_masters[patch_.first_hanging + h])
+        write(y_, m, read(y_, m) + share);
+    }
+  }
+
+  const PatchedLevel& level_;
+  const Patch& patch_;
+  S* x_;
+  S* y_;
+};
+
+/// The sums of a tile of shared vertices, or of half of it, over their copies.
+template <class S>
+kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::size_t tile, int first,
+                                   const S* partial) {
+  using R = typename Record<S>::Vector;
+  alignas(32) S sums[4 * Pack<S>::kLanes];
+  static constexpr std::uint16_t kOrder[] = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int k = 0; k < Pack<S>::kLanes; ++k) {
+    const std::size_t v = kGroup * tile + static_cast<std::size_t>(first + k) -
+                          static_cast<std::size_t>(level.first_shared);
+    R sum{};
+    for (std::int32_t i = level.copies_begin[v]; i < level.copies_begin[v + 1]; ++i) {
+      R one;
+      __builtin_memcpy(&one, partial + 4 * std::size_t(level.copies_of[i]), sizeof one);
+      sum += one;
+    }
+    __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
+  }
+  return gather_points(static_cast<const S*>(sums), kOrder);
+}
+
+}  // namespace kerf::cpu

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+//
+// A level as the fast backend walks it: patches of some thousand cells that lie together, each with
+// its own short numbers for the points of its cells, so that a product with the matrix of a patch
+// runs in the cache and adds in a fixed order, whichever thread does it.
+//
+// Vertices  are numbered anew ("packed"): those that only one patch has, patch by patch, then those
+//           that patches share; each range is filled up to a multiple of eight with vertices that
+//           are nothing, and one such tile is the last. What belongs to nothing is zero and stays
+//           so. Vectors hold tiles of eight vertices:  [tile][component][8].
+// Points    of a patch: its vertices, its hanging corners, and last one that is nothing. A hanging
+//           corner is the mean of four of the points (each of two counts twice on an edge).
+// Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
+//           nothing for corners. The cells of a group are of one kind.
+//
+//             corners   [group][corner][lane]    point
+//             matrices  [group][entry][lane]     levels above 0
+//
+// Cuts and hanging corners need nothing beyond the numbers of points.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/levels/hierarchy.hpp"
+#include "cpu/pack.hpp"
+
+namespace kerf::cpu {
+
+inline constexpr int kGroup = 8;
+inline constexpr std::size_t kTileScalars = 3 * kGroup;
+
+/// What a vertex takes from those of another level: rows of a sparse matrix.
+struct SparseWeights {
+  std::vector<std::int32_t> begin;   // per row + 1
+  std::vector<std::int32_t> vertex;  // packed, of the other level
+  std::vector<float> weight;         // multiples of 1/64: exact
+};
+
+/// What cells of level 0 have in common.
+struct CellKind {
+  double stiffness = 0, mass = 0, side = 0;  // E side, density side^3, m
+  std::uint8_t material = 0;
+
+  friend bool operator==(const CellKind&, const CellKind&) = default;
+};
+
+struct Patch {
+  std::int32_t first_group = 0, groups = 0;
+  std::int32_t first_own = 0, own = 0;          // packed vertices: multiples of eight
+  std::int32_t first_copy = 0, copies = 0;      // points that are shared vertices
+  std::int32_t first_hanging = 0, hanging = 0;  // into hanging_masters
+  std::int32_t hanging_point = 0;               // the first; the others follow
+  std::int32_t points = 0;
+};
+
+struct PatchedLevel {
+  const Level* level = nullptr;
+  std::vector<Patch> patches;
+  std::vector<CellKind> kinds;  // level 0
+
+  std::vector<std::int32_t> cell;      // per lane, -1: none
+  std::vector<std::int32_t> lane;      // per cell
+  std::vector<std::uint16_t> corners;  // [group][8][8]: points
+  std::vector<std::uint16_t> kind;     // per group, level 0
+  std::vector<std::uint8_t> folded;    // per group: some corner hangs, so that slots differ
+  std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie
+  std::vector<std::uint16_t> slots;    // [folded group][8][8]: points
+
+  std::vector<std::int32_t> vertex;      // per packed vertex: that of the level, -1: none
+  std::vector<std::int32_t> packed;      // per vertex of the level
+  std::vector<std::uint8_t> fixed;       // per packed vertex, as Level::fixed
+  std::vector<std::uint16_t> own_point;  // per packed vertex that is not shared
+  std::vector<std::uint16_t> copy_point;
+  std::vector<std::int32_t> copy_vertex;  // packed
+  std::vector<std::array<std::uint16_t, 4>> hanging_masters;
+  std::int32_t first_shared = 0;                // packed
+  std::vector<std::int32_t> copies_begin;       // per shared packed vertex + 1
+  std::vector<std::int32_t> copies_of;          // ascending
+
+  SparseWeights prolong;                // rows: packed vertices; columns: of the next level
+  SparseWeights restrict_;              // rows: packed vertices of the next level
+  std::vector<std::uint8_t> has_fixed;  // per cell of level 0
+
+  std::size_t groups() const { return cell.size() / kGroup; }
+  std::size_t vertices() const { return vertex.size(); }
+  std::size_t tiles() const { return vertex.size() / kGroup; }
+  std::size_t bytes() const;
+};
+
+/// Where component 0 of a packed vertex lies in a vector; the others follow in steps of eight.
+inline std::size_t scalar_of(std::int32_t packed) {
+  const auto v = static_cast<std::size_t>(packed);
+  return kTileScalars * (v / kGroup) + v % kGroup;
+}
+
+/// All but the weights between levels.
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, int threads);
+
+/// The weights from `fine` to the next level.
+void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine);
+
+}  // namespace kerf::cpu
