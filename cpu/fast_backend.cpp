@@ -302,8 +302,8 @@ void invert_own(FastLevel<S>& l, const Patch& patch, const BlockPoints<S>& from)
     for_packs<S>([&](int first) {
       const std::uint16_t* points = l.patched.own_point.data() + v + first;
       invert_tile(l, static_cast<std::size_t>(v / kGroup), first,
-                  gather_points(static_cast<const S*>(from.upper), points),
-                  gather_points(static_cast<const S*>(from.lower), points));
+                  gathered(static_cast<const S*>(from.upper), points),
+                  gathered(static_cast<const S*>(from.lower), points));
     });
 }
 

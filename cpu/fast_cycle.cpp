@@ -196,7 +196,7 @@ Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t til
     }
     __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
   }
-  return masked(gather_points(static_cast<const S*>(sums), kOrder), to.fixed(tile, first));
+  return masked(gathered(static_cast<const S*>(sums), kOrder), to.fixed(tile, first));
 }
 
 /// The correction waits for the sweep that reads the solution next.

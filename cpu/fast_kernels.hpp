@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <type_traits>
 #include <vector>
 
 #include "core/backend.hpp"
@@ -56,15 +57,42 @@ inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t
          static_cast<std::size_t>(first);
 }
 
-template <class S>
-void gather_corners(const PatchedLevel& level, std::size_t group, int first, const S* x,
-                    kernels::Vec3<Pack<S>> (&out)[8]) {
-  for (int i = 0; i < 8; ++i) out[i] = gather_points(x, corner_points(level, group, first, i));
+/// The corners of a group, or of half of it in double. In a row they follow each other along x, so
+/// that two of them are read and written together and no numbers but the first are.
+/// Inlined, since arrays of packs that a call fills are cleared before.
+template <bool kRow, class S>
+[[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
+                                                  kernels::Vec3<Pack<S>> (&out)[8]) {
+  for (int i = 0; i < 8; i += 2) {
+    if constexpr (kRow) {
+      gather_row(x + 4 * std::size_t(points[kGroup * i]), out[i], out[i + 1]);
+    } else {
+      gather_points(x, points + kGroup * i, out[i]);
+      gather_points(x, points + kGroup * (i + 1), out[i + 1]);
+    }
+  }
 }
-template <class S>
-void add_corners(const PatchedLevel& level, std::size_t group, int first,
-                 const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
-  for (int i = 0; i < 8; ++i) add_to_points(y, corner_points(level, group, first, i), f[i]);
+template <bool kRow, class S>
+[[gnu::always_inline]] inline void add_corners(const std::uint16_t* points,
+                                               const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
+  for (int i = 0; i < 8; i += 2) {
+    if constexpr (kRow) {
+      add_to_row(y + 4 * std::size_t(points[kGroup * i]), f[i], f[i + 1]);
+    } else {
+      add_to_points(y, points + kGroup * i, f[i]);
+      add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
+    }
+  }
+}
+
+/// Calls body(points of the corners, whether they are rows, first lane) for each pack of a group.
+template <class S, class Body>
+void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
+  const std::uint16_t* points = level.corners.data() + 8 * kGroup * group;
+  if (level.row[group] != 0)
+    for_packs<S>([&](int first) { body(points + first, std::true_type{}, first); });
+  else
+    for_packs<S>([&](int first) { body(points + first, std::false_type{}, first); });
 }
 
 /// y += A x for a group of level 0.
@@ -75,12 +103,15 @@ void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
   const CellKind& kind = level.kinds[level.kind[group]];
   const PackedMaterial<S>& material = values.materials[kind.material];
   const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     kernels::Vec3<P> at[8];
-    gather_corners(level, group, first, x, at);
+    gather_corners<row()>(points, x, at);
     const auto R = kernels::to_matrix(values.quaternion(group, first));
-    kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
-    add_corners(level, group, first, at, y);
+    if (scale.mass == 0)
+      kernels::apply_cell(at, R, stiffness, material.modes.stiffness, at);
+    else
+      kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
+    add_corners<row()>(points, at, y);
   });
 }
 
@@ -89,16 +120,16 @@ template <class S>
 void stored_products(const PatchedLevel& level, const S* matrices, std::size_t group, const S* x,
                      S* y) {
   using P = Pack<S>;
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     const S* tile = matrices + kEntries * kGroup * group + first;
     kernels::Vec3<P> at[8], f[8];
-    gather_corners(level, group, first, x, at);
+    gather_corners<row()>(points, x, at);
     struct Entries {
       const S* tile;
       P operator[](int entry) const { return load_pack(tile + kGroup * entry); }
     };
     kernels::apply_packed(Entries{tile}, at, f);
-    add_corners(level, group, first, f, y);
+    add_corners<row()>(points, f, y);
   });
 }
 
@@ -108,12 +139,12 @@ void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, st
                     const S* x, S* y) {
   using P = Pack<S>;
   const CellKind& kind = level.kinds[level.kind[group]];
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     kernels::Vec3<P> at[8];
-    gather_corners(level, group, first, x, at);
+    gather_corners<row()>(points, x, at);
     kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
                            values.materials[kind.material].modes.stiffness, at);
-    add_corners(level, group, first, at, y);
+    add_corners<row()>(points, at, y);
   });
 }
 
@@ -126,9 +157,9 @@ void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_
   constexpr int kIterations = 8;
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
   const P side = P(level.kinds[level.kind[group]].side);
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     kernels::Vec3<P> corners[8];
-    gather_corners(level, group, first, x, corners);
+    gather_corners<row()>(points, x, corners);
     const auto F = kernels::mean_gradient(corners, side);
     const auto start = values.quaternion(group, first);
     auto q = kernels::normalised(start);

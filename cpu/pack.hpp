@@ -139,7 +139,8 @@ void store_pack(S* to, const Pack<S>& pack) {
 // Points are records of four scalars, the fourth of them zero, aligned to their size.
 
 /// One vector of each lane's point.
-inline kernels::Vec3<Pack<float>> gather_points(const float* x, const std::uint16_t* at) {
+inline void gather_points(const float* x, const std::uint16_t* at,
+                          kernels::Vec3<Pack<float>>& out) {
 #if defined(__AVX2__) && defined(__FMA__)
   const auto pair = [&](int low, int high) {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(x + 4 * std::size_t(at[low]))),
@@ -148,17 +149,16 @@ inline kernels::Vec3<Pack<float>> gather_points(const float* x, const std::uint1
   const __m256 a = pair(0, 4), b = pair(1, 5), c = pair(2, 6), d = pair(3, 7);
   const __m256 ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
   const __m256 cd_low = _mm256_unpacklo_ps(c, d), cd_high = _mm256_unpackhi_ps(c, d);
-  using V = Pack<float>::Vector;
-  return {V(_mm256_shuffle_ps(ab_low, cd_low, 0x44)), V(_mm256_shuffle_ps(ab_low, cd_low, 0xEE)),
-          V(_mm256_shuffle_ps(ab_high, cd_high, 0x44))};
+  out.x.v = _mm256_shuffle_ps(ab_low, cd_low, 0x44);
+  out.y.v = _mm256_shuffle_ps(ab_low, cd_low, 0xEE);
+  out.z.v = _mm256_shuffle_ps(ab_high, cd_high, 0x44);
 #else
-  kernels::Vec3<Pack<float>> out;
   for (int i = 0; i < 8; ++i)
     for (int c = 0; c < 3; ++c) out[c].set(i, x[4 * std::size_t(at[i]) + std::size_t(c)]);
-  return out;
 #endif
 }
-inline kernels::Vec3<Pack<double>> gather_points(const double* x, const std::uint16_t* at) {
+inline void gather_points(const double* x, const std::uint16_t* at,
+                          kernels::Vec3<Pack<double>>& out) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256d a = _mm256_load_pd(x + 4 * std::size_t(at[0]));
   const __m256d b = _mm256_load_pd(x + 4 * std::size_t(at[1]));
@@ -166,16 +166,19 @@ inline kernels::Vec3<Pack<double>> gather_points(const double* x, const std::uin
   const __m256d d = _mm256_load_pd(x + 4 * std::size_t(at[3]));
   const __m256d ab_low = _mm256_unpacklo_pd(a, b), ab_high = _mm256_unpackhi_pd(a, b);
   const __m256d cd_low = _mm256_unpacklo_pd(c, d), cd_high = _mm256_unpackhi_pd(c, d);
-  using V = Pack<double>::Vector;
-  return {V(_mm256_permute2f128_pd(ab_low, cd_low, 0x20)),
-          V(_mm256_permute2f128_pd(ab_high, cd_high, 0x20)),
-          V(_mm256_permute2f128_pd(ab_low, cd_low, 0x31))};
+  out.x.v = _mm256_permute2f128_pd(ab_low, cd_low, 0x20);
+  out.y.v = _mm256_permute2f128_pd(ab_high, cd_high, 0x20);
+  out.z.v = _mm256_permute2f128_pd(ab_low, cd_low, 0x31);
 #else
-  kernels::Vec3<Pack<double>> out;
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < 3; ++c) out[c].set(i, x[4 * std::size_t(at[i]) + std::size_t(c)]);
-  return out;
 #endif
+}
+template <class S>
+kernels::Vec3<Pack<S>> gathered(const S* x, const std::uint16_t* at) {
+  kernels::Vec3<Pack<S>> out;
+  gather_points(x, at, out);
+  return out;
 }
 
 /// Calls body(lane, record) for the vectors of the lanes, as records, in the order of the lanes.
@@ -208,6 +211,132 @@ void for_records(const kernels::Vec3<Pack<double>>& f, const Body& body) {
   body(3, R(_mm256_permute2f128_pd(xy_high, z0_high, 0x31)));
 #else
   for (int i = 0; i < 4; ++i) body(i, Record<double>::Vector{f.x[i], f.y[i], f.z[i], 0});
+#endif
+}
+
+// The left and right ends of a row of cells, whose points follow each other: lane k has points k
+// and k + 1 from `first` on. Results by reference: GCC 12 copies structs of packs by halves of
+// 64 bits.
+inline void gather_row(const float* first, kernels::Vec3<Pack<float>>& left,
+                       kernels::Vec3<Pack<float>>& right) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const auto pair = [&](int low) {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(first + 4 * low)),
+                                _mm_load_ps(first + 4 * low + 16), 1);
+  };
+  const __m256 a = pair(0), b = pair(1), c = pair(2), d = pair(3), e = pair(4);
+  const __m256 ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
+  const __m256 cd_low = _mm256_unpacklo_ps(c, d), cd_high = _mm256_unpackhi_ps(c, d);
+  left.x.v = _mm256_shuffle_ps(ab_low, cd_low, 0x44);
+  left.y.v = _mm256_shuffle_ps(ab_low, cd_low, 0xEE);
+  left.z.v = _mm256_shuffle_ps(ab_high, cd_high, 0x44);
+  const __m256 bc_low = _mm256_unpacklo_ps(b, c), bc_high = _mm256_unpackhi_ps(b, c);
+  const __m256 de_low = _mm256_unpacklo_ps(d, e), de_high = _mm256_unpackhi_ps(d, e);
+  right.x.v = _mm256_shuffle_ps(bc_low, de_low, 0x44);
+  right.y.v = _mm256_shuffle_ps(bc_low, de_low, 0xEE);
+  right.z.v = _mm256_shuffle_ps(bc_high, de_high, 0x44);
+#else
+  for (int i = 0; i < 8; ++i)
+    for (int c = 0; c < 3; ++c) {
+      left[c].set(i, first[4 * i + c]);
+      right[c].set(i, first[4 * i + 4 + c]);
+    }
+#endif
+}
+inline void gather_row(const double* first, kernels::Vec3<Pack<double>>& left,
+                       kernels::Vec3<Pack<double>>& right) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const __m256d a = _mm256_load_pd(first), b = _mm256_load_pd(first + 4);
+  const __m256d c = _mm256_load_pd(first + 8), d = _mm256_load_pd(first + 12);
+  const __m256d e = _mm256_load_pd(first + 16);
+  const __m256d ab_low = _mm256_unpacklo_pd(a, b), ab_high = _mm256_unpackhi_pd(a, b);
+  const __m256d cd_low = _mm256_unpacklo_pd(c, d), cd_high = _mm256_unpackhi_pd(c, d);
+  left.x.v = _mm256_permute2f128_pd(ab_low, cd_low, 0x20);
+  left.y.v = _mm256_permute2f128_pd(ab_high, cd_high, 0x20);
+  left.z.v = _mm256_permute2f128_pd(ab_low, cd_low, 0x31);
+  const __m256d bc_low = _mm256_unpacklo_pd(b, c), bc_high = _mm256_unpackhi_pd(b, c);
+  const __m256d de_low = _mm256_unpacklo_pd(d, e), de_high = _mm256_unpackhi_pd(d, e);
+  right.x.v = _mm256_permute2f128_pd(bc_low, de_low, 0x20);
+  right.y.v = _mm256_permute2f128_pd(bc_high, de_high, 0x20);
+  right.z.v = _mm256_permute2f128_pd(bc_low, de_low, 0x31);
+#else
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) {
+      left[c].set(i, first[4 * i + c]);
+      right[c].set(i, first[4 * i + 4 + c]);
+    }
+#endif
+}
+
+/// Adds the ends of a row to its points: what two cells give to a point is summed first.
+inline void add_to_row(float* first, const kernels::Vec3<Pack<float>>& left,
+                       const kernels::Vec3<Pack<float>>& right) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const auto merged = [](const Pack<float>& low, const Pack<float>& high) {
+    const __m256 h(high.v);
+    const __m256 turned = _mm256_permutevar8x32_ps(h, _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6));
+    return _mm256_add_ps(__m256(low.v), _mm256_blend_ps(turned, _mm256_setzero_ps(), 1));
+  };
+  const __m256 x = merged(left.x, right.x), y = merged(left.y, right.y);
+  const __m256 z = merged(left.z, right.z), zero = _mm256_setzero_ps();
+  const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
+  const __m256 z0_low = _mm256_unpacklo_ps(z, zero), z0_high = _mm256_unpackhi_ps(z, zero);
+  const __m256 r04 = _mm256_shuffle_ps(xy_low, z0_low, 0x44);
+  const __m256 r15 = _mm256_shuffle_ps(xy_low, z0_low, 0xEE);
+  const __m256 r26 = _mm256_shuffle_ps(xy_high, z0_high, 0x44);
+  const __m256 r37 = _mm256_shuffle_ps(xy_high, z0_high, 0xEE);
+  const auto add = [&](int point, __m256 two) {
+    float* to = first + 4 * point;
+    _mm256_storeu_ps(to, _mm256_add_ps(_mm256_loadu_ps(to), two));
+  };
+  add(0, _mm256_permute2f128_ps(r04, r15, 0x20));
+  add(2, _mm256_permute2f128_ps(r26, r37, 0x20));
+  add(4, _mm256_permute2f128_ps(r04, r15, 0x31));
+  add(6, _mm256_permute2f128_ps(r26, r37, 0x31));
+  // The last lane of the right ends: x, y, z, 0.
+  const __m128 xh = _mm256_extractf128_ps(__m256(right.x.v), 1);
+  const __m128 yh = _mm256_extractf128_ps(__m256(right.y.v), 1);
+  const __m128 zh = _mm256_extractf128_ps(__m256(right.z.v), 1);
+  const __m128 last = _mm_shuffle_ps(_mm_unpackhi_ps(xh, yh),
+                                     _mm_unpackhi_ps(zh, _mm_setzero_ps()), 0xEE);
+  _mm_store_ps(first + 32, _mm_add_ps(_mm_load_ps(first + 32), last));
+#else
+  for (int c = 0; c < 3; ++c) {
+    first[c] += left[c][0];
+    for (int i = 1; i < 8; ++i) first[4 * i + c] += left[c][i] + right[c][i - 1];
+    first[32 + c] += right[c][7];
+  }
+#endif
+}
+inline void add_to_row(double* first, const kernels::Vec3<Pack<double>>& left,
+                       const kernels::Vec3<Pack<double>>& right) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const auto merged = [](const Pack<double>& low, const Pack<double>& high) {
+    const __m256d turned = _mm256_permute4x64_pd(__m256d(high.v), 0x93);
+    return _mm256_add_pd(__m256d(low.v), _mm256_blend_pd(turned, _mm256_setzero_pd(), 1));
+  };
+  const __m256d x = merged(left.x, right.x), y = merged(left.y, right.y);
+  const __m256d z = merged(left.z, right.z), zero = _mm256_setzero_pd();
+  const __m256d xy_low = _mm256_unpacklo_pd(x, y), xy_high = _mm256_unpackhi_pd(x, y);
+  const __m256d z0_low = _mm256_unpacklo_pd(z, zero), z0_high = _mm256_unpackhi_pd(z, zero);
+  const auto add = [&](int point, __m256d one) {
+    double* to = first + 4 * point;
+    _mm256_store_pd(to, _mm256_add_pd(_mm256_load_pd(to), one));
+  };
+  add(0, _mm256_permute2f128_pd(xy_low, z0_low, 0x20));
+  add(1, _mm256_permute2f128_pd(xy_high, z0_high, 0x20));
+  add(2, _mm256_permute2f128_pd(xy_low, z0_low, 0x31));
+  add(3, _mm256_permute2f128_pd(xy_high, z0_high, 0x31));
+  const __m256d last = _mm256_permute2f128_pd(
+      _mm256_unpackhi_pd(__m256d(right.x.v), __m256d(right.y.v)),
+      _mm256_unpackhi_pd(__m256d(right.z.v), zero), 0x31);
+  add(4, last);
+#else
+  for (int c = 0; c < 3; ++c) {
+    first[c] += left[c][0];
+    for (int i = 1; i < 4; ++i) first[4 * i + c] += left[c][i] + right[c][i - 1];
+    first[16 + c] += right[c][3];
+  }
 #endif
 }
 

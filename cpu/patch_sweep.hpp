@@ -123,8 +123,8 @@ class PatchPoints {
     for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
       for_packs<S>([&](int first) {
         const std::uint16_t* points = own_points(at, first);
-        sum += finish(at, first, gather_points(y_, points),
-                      [&] { return gather_points(static_cast<const S*>(x_), points); });
+        sum += finish(at, first, gathered(y_, points),
+                      [&] { return gathered(static_cast<const S*>(x_), points); });
       });
     for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k)
       std::memcpy(partial + 4 * std::size_t(k), y_ + 4 * std::size_t(level_.copy_point[k]),
@@ -186,7 +186,7 @@ kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::size_t tile, 
     }
     __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
   }
-  return gather_points(static_cast<const S*>(sums), kOrder);
+  return gathered(static_cast<const S*>(sums), kOrder);
 }
 
 }  // namespace kerf::cpu

@@ -49,6 +49,7 @@ struct Draft {
   std::vector<std::int32_t> cells;     // per lane, -1: none
   std::vector<std::uint16_t> corners;  // [group][8][8]
   std::vector<std::uint16_t> slots;    // the same, of the groups that are folded
+  std::vector<std::uint8_t> row;       // per group
   std::vector<std::uint8_t> folded;    // per group
   std::vector<std::uint16_t> kind;     // per group
   std::vector<std::int32_t> vertices;  // of the level, ascending: points 0 ..
@@ -114,22 +115,53 @@ class HangingPoints {
   std::unordered_map<std::uint64_t, std::int32_t> known_;
 };
 
-/// Order and groups of the cells of a patch: by kind, then by fold, then as the level has them.
+/// Whether `next` lies beside `cell` along x, joined, and the vertices of both follow each other.
+bool continues(const Level& level, std::int32_t cell, std::int32_t next) {
+  const auto& a = level.slots[cell];
+  const auto& b = level.slots[next];
+  for (std::size_t i = 0; i < 8; i += 2)
+    if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
+  return true;
+}
+
+/// Order and groups of the cells of a patch: by kind, then by fold, then as the level has them; of
+/// each kind those first that make whole rows.
 void order_cells(const Level& level, const std::vector<std::uint16_t>& kind_of, Draft& draft) {
-  std::vector<std::int32_t> cells = std::move(draft.cells);
+  std::vector<std::int32_t> cells = std::move(draft.cells), rest;
   const auto kind = [&](std::int32_t c) { return kind_of.empty() ? std::uint16_t{0} : kind_of[c]; };
   const auto fold = [&](std::int32_t c) { return (level.fold[c] & 255) == 0 ? 0 : level.fold[c]; };
   std::sort(cells.begin(), cells.end(), [&](std::int32_t a, std::int32_t b) {
     return std::tuple(kind(a), fold(a), a) < std::tuple(kind(b), fold(b), b);
   });
   draft.cells.clear();
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (i > 0 && kind(cells[i]) != kind(cells[i - 1]))
-      while (draft.cells.size() % kGroup != 0) draft.cells.push_back(-1);
-    if (draft.cells.size() % kGroup == 0) draft.kind.push_back(kind(cells[i]));
-    draft.cells.push_back(cells[i]);
+  const auto put = [&](std::int32_t c, bool row) {
+    if (draft.cells.size() % kGroup == 0) {
+      draft.kind.push_back(kind(c));
+      draft.row.push_back(row);
+    }
+    draft.cells.push_back(c);
+  };
+  const auto put_rest = [&] {
+    for (const std::int32_t c : rest) put(c, false);
+    while (draft.cells.size() % kGroup != 0) draft.cells.push_back(-1);
+    rest.clear();
+  };
+  for (std::size_t i = 0; i < cells.size();) {
+    if (i > 0 && kind(cells[i]) != kind(cells[i - 1])) put_rest();
+    std::size_t run = 1;
+    while (run < kGroup && fold(cells[i]) == 0 && i + run < cells.size() &&
+           kind(cells[i + run]) == kind(cells[i]) && fold(cells[i + run]) == 0 &&
+           continues(level, cells[i + run - 1], cells[i + run]))
+      ++run;
+    const bool row = run == kGroup;
+    for (std::size_t k = i; k < i + run; ++k)
+      if (row)
+        put(cells[k], true);
+      else
+        rest.push_back(cells[k]);
+    i += run;
   }
-  while (draft.cells.size() % kGroup != 0) draft.cells.push_back(-1);
+  put_rest();
 }
 
 /// Points of all corners of a patch, and of the slots where some corner hangs.
@@ -280,6 +312,7 @@ void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
     append(out.cell, draft.cells);
     append(out.corners, draft.corners);
     append(out.slots, draft.slots);
+    append(out.row, draft.row);
     append(out.folded, draft.folded);
     append(out.kind, draft.kind);
     append(out.hanging_masters, draft.masters);
@@ -332,7 +365,7 @@ SparseWeights transposed(const SparseWeights& rows, std::size_t columns) {
 
 std::size_t PatchedLevel::bytes() const {
   return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) +
-         bytes_of(corners) + bytes_of(kind) + bytes_of(folded) + bytes_of(slots_at) +
+         bytes_of(corners) + bytes_of(kind) + bytes_of(row) + bytes_of(folded) + bytes_of(slots_at) +
          bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
          bytes_of(own_point) + bytes_of(copy_point) + bytes_of(copy_vertex) +
          bytes_of(hanging_masters) + bytes_of(copies_begin) + bytes_of(copies_of) +

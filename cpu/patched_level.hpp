@@ -65,6 +65,7 @@ struct PatchedLevel {
   std::vector<std::int32_t> lane;      // per cell
   std::vector<std::uint16_t> corners;  // [group][8][8]: points
   std::vector<std::uint16_t> kind;     // per group, level 0
+  std::vector<std::uint8_t> row;       // per group: cells side by side along x, points in order
   std::vector<std::uint8_t> folded;    // per group: some corner hangs, so that slots differ
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie
   std::vector<std::uint16_t> slots;    // [folded group][8][8]: points

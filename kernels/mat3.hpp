@@ -82,38 +82,41 @@ struct Mat3 {
     return *this;
   }
   friend KERF_HD Mat3 operator+(Mat3 a, const Mat3& b) { return a += b; }
-  friend KERF_HD Mat3 operator*(T s, Mat3 a) { return a *= s; }
+  // In one go: an array of packs that is filled later is cleared first.
+  friend KERF_HD Mat3 operator*(T s, const Mat3& a) {
+    return {{{s * a[0][0], s * a[0][1], s * a[0][2]},
+             {s * a[1][0], s * a[1][1], s * a[1][2]},
+             {s * a[2][0], s * a[2][1], s * a[2][2]}}};
+  }
 };
 
 template <class T>
 KERF_HD Vec3<T> operator*(const Mat3<T>& a, const Vec3<T>& v) {
-  return {a[0][0] * v.x + a[0][1] * v.y + a[0][2] * v.z,
-          a[1][0] * v.x + a[1][1] * v.y + a[1][2] * v.z,
-          a[2][0] * v.x + a[2][1] * v.y + a[2][2] * v.z};
+  return {fma(a[0][0], v.x, fma(a[0][1], v.y, a[0][2] * v.z)),
+          fma(a[1][0], v.x, fma(a[1][1], v.y, a[1][2] * v.z)),
+          fma(a[2][0], v.x, fma(a[2][1], v.y, a[2][2] * v.z))};
 }
 
 /// transpose(a) * v without forming the transpose.
 template <class T>
 KERF_HD Vec3<T> transpose_times(const Mat3<T>& a, const Vec3<T>& v) {
-  return {a[0][0] * v.x + a[1][0] * v.y + a[2][0] * v.z,
-          a[0][1] * v.x + a[1][1] * v.y + a[2][1] * v.z,
-          a[0][2] * v.x + a[1][2] * v.y + a[2][2] * v.z};
+  return {fma(a[0][0], v.x, fma(a[1][0], v.y, a[2][0] * v.z)),
+          fma(a[0][1], v.x, fma(a[1][1], v.y, a[2][1] * v.z)),
+          fma(a[0][2], v.x, fma(a[1][2], v.y, a[2][2] * v.z))};
 }
 
 template <class T>
 KERF_HD Mat3<T> operator*(const Mat3<T>& a, const Mat3<T>& b) {
   Mat3<T> c;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j];
+    for (int j = 0; j < 3; ++j)
+      c[i][j] = fma(a[i][0], b[0][j], fma(a[i][1], b[1][j], a[i][2] * b[2][j]));
   return c;
 }
 
 template <class T>
 KERF_HD Mat3<T> transpose(const Mat3<T>& a) {
-  Mat3<T> t;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) t[i][j] = a[j][i];
-  return t;
+  return {{{a[0][0], a[1][0], a[2][0]}, {a[0][1], a[1][1], a[2][1]}, {a[0][2], a[1][2], a[2][2]}}};
 }
 
 template <class T>
@@ -276,23 +279,20 @@ KERF_HD Mat3<T> to_matrix_less_identity(const Quat<T>& q) {
   const T xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z;
   const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
   const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
-  Mat3<T> D;
-  D[0][0] = -yy - zz;
-  D[0][1] = xy - wz;
-  D[0][2] = xz + wy;
-  D[1][0] = xy + wz;
-  D[1][1] = -xx - zz;
-  D[1][2] = yz - wx;
-  D[2][0] = xz - wy;
-  D[2][1] = yz + wx;
-  D[2][2] = -xx - yy;
-  return D;
+  return {{{-yy - zz, xy - wz, xz + wy}, {xy + wz, -xx - zz, yz - wx}, {xz - wy, yz + wx, -xx - yy}}};
 }
 
 /// Needs  |q| = 1 up to rounding.
 template <class T>
 KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
-  return Mat3<T>::identity() + to_matrix_less_identity(q);
+  const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const T xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z;
+  const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
+  const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
+  const T one = T(1);
+  return {{{one - (yy + zz), xy - wz, xz + wy},
+           {xy + wz, one - (xx + zz), yz - wx},
+           {xz - wy, yz + wx, one - (xx + yy)}}};
 }
 
 }  // namespace kerf::kernels

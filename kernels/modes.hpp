@@ -124,10 +124,23 @@ KERF_HD void apply_modes(const ModeStiffness<T>& k, Vec3<T> (&m)[kCorners]) {
   m[3].z = k.g * (xy.z + twist);
 }
 
-/// f = (stiffness [R] K [R]^T + mass M (x) I) u for one finest cell; f may be u.
+/// f = stiffness [R] K [R]^T u for one finest cell without inertia; f may be u. 318 slots.
 ///
 /// Shapes  u, f: 8 corners; R: proper rotation from the reference to the deformed cell.
 /// Source  [DGW11], section 5.
+template <class T>
+KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffness,
+                        const ModeStiffness<T>& k, Vec3<T> (&f)[kCorners]) {
+  for (int i = 0; i < kCorners; ++i) f[i] = u[i];
+  to_modes(f);
+  for (int s = 1; s < kCorners; ++s) f[s] = transpose_times(R, f[s]);
+  apply_modes(k, f);
+  const Mat3<T> scaled = stiffness * R;
+  for (int s = 1; s < kCorners; ++s) f[s] = scaled * f[s];
+  to_corners(f);
+}
+
+/// f = (stiffness [R] K [R]^T + mass M (x) I) u; f may be u.
 template <class T>
 KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffness, T mass,
                         const ModeConstants<T>& constants, Vec3<T> (&f)[kCorners]) {
@@ -136,9 +149,16 @@ KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffn
   to_modes(modes);
   for (int s = 1; s < kCorners; ++s) local[s] = transpose_times(R, modes[s]);
   apply_modes(constants.stiffness, local);
-  f[0] = (mass * constants.mass[0]) * modes[0];
-  for (int s = 1; s < kCorners; ++s)
-    f[s] = stiffness * (R * local[s]) + (mass * constants.mass[mode_axes(s)]) * modes[s];
+  const Mat3<T> scaled = stiffness * R;
+  T inertia[4];
+  for (int axes = 0; axes < 4; ++axes) inertia[axes] = mass * constants.mass[axes];
+  f[0] = inertia[0] * modes[0];
+  for (int s = 1; s < kCorners; ++s) {
+    const T m = inertia[mode_axes(s)];
+    const Vec3<T> elastic = scaled * local[s];
+    f[s] = {fma(m, modes[s].x, elastic.x), fma(m, modes[s].y, elastic.y),
+            fma(m, modes[s].z, elastic.z)};
+  }
   to_corners(f);
 }
 
