@@ -6,6 +6,7 @@
 // level. A vector has three components per vertex; on the host it is x0 y0 z0 x1 y1 z1 ...
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -85,6 +86,15 @@ class Backend {
   virtual void solve_coarsest() = 0;                   ///< u from f
   virtual void apply(int level, int in, int out) = 0;  ///< out = A in
   virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
+
+  // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here said
+  // with the operations above.
+  /// x.y and x.z.
+  virtual std::array<double, 2> dots(int x, int y, int z);
+  /// d = z + beta d and q = A d; returns d.q and d.r.
+  virtual std::array<double, 2> advance_direction(int z, double beta, int d, int q, int r);
+  /// x += a d and r -= a q; returns r.r.
+  virtual double advance_solution(double a, int d, int q, int x, int r);
 
   // Forces, level 0.
   /// out = sum over cells of [R] K ([R]^T (x + u) - x); held components too (reactions).

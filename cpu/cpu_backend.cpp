@@ -249,7 +249,7 @@ void CpuBackend::factor_coarsest() {
     cpu::cell_matrix(store, cell, packed);
     std::copy_n(packed, kEntries, out.data());
   });
-  if (levels_.size() > 1) coarsest_->strengthen_diagonal();
+  if (levels_.size() > 1) coarsest_->strengthen_diagonal(AssembledLevel::kShare);
   expects(
       coarsest_factor_.factor(*coarsest_),
       "the system matrix is not positive definite: in static mode some part of the body can move "

@@ -167,18 +167,18 @@ constexpr auto kNothingBefore = [](std::size_t) {};
 
 template <class S>
 template <class T>
-double FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
-                                   int out) {
+void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
+                                 int out) {
   FastLevel<S>& l = levels_[level];
   const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
-  return sweep<T>(
+  sweep<T>(
       level, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
       [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
         store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
-        return 0.0;
+        return Sums{};
       });
 }
 
@@ -215,7 +215,7 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
       },
       [&](std::size_t tile, int first, const Vec3<Pack<double>>& sum, const auto&) {
         store_tile(to, tile, first, sum);
-        return 0.0;
+        return Sums{};
       });
 }
 
@@ -376,17 +376,22 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
       out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
 }
 
+// Rounding in single precision can leave a singular matrix indefinite, so there the share grows.
 template <class S>
 void FastBackend<S>::factor_coarsest() {
+  constexpr double kGrowth = 100, kMost = std::is_same_v<S, double> ? 0 : 1e-6;
   const int last = static_cast<int>(levels_.size()) - 1;
-  coarsest_->assemble(hierarchy_->levels.back(), [&](std::int32_t cell, std::span<double> out) {
-    read_cell_matrix(last, cell, out);
-  });
-  if (last > 0) coarsest_->strengthen_diagonal();
-  expects(
-      coarsest_factor_.factor(*coarsest_),
-      "the system matrix is not positive definite: in static mode some part of the body can move "
-      "freely and needs a [[support]]; otherwise sizes, moduli or the time step are out of range");
+  for (double share = AssembledLevel::kShare;; share *= kGrowth) {
+    coarsest_->assemble(
+        hierarchy_->levels.back(),
+        [&](std::int32_t cell, std::span<double> out) { read_cell_matrix(last, cell, out); });
+    if (last > 0) coarsest_->strengthen_diagonal(share);
+    if (coarsest_factor_.factor(*coarsest_)) return;
+    expects(last > 0 && share < kMost,
+            "the system matrix is not positive definite: in static mode some part of the body can "
+            "move freely and needs a [[support]]; otherwise sizes, moduli or the time step are out "
+            "of range");
+  }
 }
 
 template class FastBackend<float>;

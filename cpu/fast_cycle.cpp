@@ -11,14 +11,6 @@
 namespace kerf::cpu {
 
 template <class S>
-double square_sum(const Vec3<Pack<S>>& v) {
-  const Pack<S> squares = fma(v.x, v.x, fma(v.y, v.y, v.z * v.z));
-  double sum = 0;
-  for (int k = 0; k < Pack<S>::kLanes; ++k) sum += static_cast<double>(squares[k]);
-  return sum;
-}
-
-template <class S>
 double FastBackend<S>::residual(int level) {
   settle();
   FastLevel<S>& l = levels_[level];
@@ -26,18 +18,19 @@ double FastBackend<S>::residual(int level) {
   const S* u = l.at(kSolution);
   S* r = l.at(kResidual);
   if (l.solution_is_zero) {
-    std::copy_n(f, l.scalars(), r);
-    return std::sqrt(dot_typed(r, r, l.scalars()));
+    copy(level, kRight, kResidual);
+    return std::sqrt(dot(level, kResidual, kResidual));
   }
-  return std::sqrt(sweep<S>(
+  const Sums sums = sweep<S>(
       level, [](std::size_t) {},
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
       [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
         const auto at = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
         store_tile(r, tile, first, at);
-        return square_sum(at);
-      }));
+        return Sums{dot_lanes(at, at)};
+      });
+  return std::sqrt(sums.first);
 }
 
 template <class S>
@@ -103,7 +96,7 @@ void FastBackend<S>::chebyshev(int level) {
             direction += Pack<S>(keep) * load_tile(static_cast<const S*>(d), tile, first);
           if (!last) store_tile(d, tile, first, direction);
           store_tile(u, tile, first, at + direction);
-          return 0.0;
+          return Sums{};
         });
   };
   const int degree = smoother_.degree;
@@ -303,16 +296,79 @@ void FastBackend<S>::combine(int level, double a, int x, double b, int y) {
   });
 }
 
-// Fixed chunks, summed in their order, eight sums side by side in each: the same bits for any
-// number of threads.
 template <class S>
 double FastBackend<S>::dot(int level, int x, int y) {
   settle();
   FastLevel<S>& l = levels_[level];
   double out = 0;
-  with_types(l.vectors[x], l.vectors[y],
-             [&](const auto* a, const auto* b) { out = dot_typed(a, b, l.scalars()); });
+  with_types(l.vectors[x], l.vectors[y], [&](const auto* a, const auto* b) {
+    out = sum_scalars<1>(l.scalars(), [&](std::int32_t i) {
+      return std::array{static_cast<double>(a[i]) * static_cast<double>(b[i])};
+    })[0];
+  });
   return out;
+}
+
+template <class S>
+std::array<double, 2> FastBackend<S>::dots(int x, int y, int z) {
+  expects_exact(y, z);
+  settle();
+  FastLevel<S>& l = levels_[0];
+  const double *b = l.vectors[y].exact.data(), *c = l.vectors[z].exact.data();
+  std::array<double, 2> out{};
+  with_types(l.vectors[x], l.vectors[y], [&](const auto* a, const auto*) {
+    out = sum_scalars<2>(l.scalars(), [&](std::int32_t i) {
+      const auto at = static_cast<double>(a[i]);
+      return std::array{at * b[i], at * c[i]};
+    });
+  });
+  return out;
+}
+
+template <class S>
+std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int d, int q, int r) {
+  using V = Vec3<Pack<double>>;
+  expects_exact(d, q);
+  settle();
+  FastLevel<S>& l = levels_[0];
+  double *to = l.vectors[d].exact.data(), *product = l.vectors[q].exact.data();
+  const double* residual = l.vectors[r].exact.data();
+  Sums sums;
+  with_types(l.vectors[z], l.vectors[d], [&](const auto* from, const auto*) {
+    const auto advance = [&](std::size_t tile, int first) {
+      V at = load_tile_as<double>(from, tile, first);
+      if (beta != 0) at += Pack<double>(beta) * load_tile(static_cast<const double*>(to), tile, first);
+      store_tile(to, tile, first, at);
+      return at;
+    };
+    sums = sweep<double>(
+        0, [&](std::size_t tile) { for_packs<double>([&](int first) { advance(tile, first); }); },
+        advance, to,
+        [&](std::size_t group, const double* x, double* y) {
+          add_products(0, scale_, group, x, y);
+        },
+        [&](std::size_t tile, int first, const V& sum, const auto& value) {
+          const V at = value(), out = masked(sum, l.fixed(tile, first));
+          store_tile(product, tile, first, out);
+          return Sums{dot_lanes(at, out), dot_lanes(at, load_tile(residual, tile, first))};
+        });
+  });
+  return {sums.first, sums.second};
+}
+
+template <class S>
+double FastBackend<S>::advance_solution(double a, int d, int q, int x, int r) {
+  expects_exact(d, q);
+  expects_exact(x, r);
+  settle();
+  FastLevel<S>& l = levels_[0];
+  const double *direction = l.vectors[d].exact.data(), *product = l.vectors[q].exact.data();
+  double *solution = l.vectors[x].exact.data(), *residual = l.vectors[r].exact.data();
+  return sum_scalars<1>(l.scalars(), [&](std::int32_t i) {
+    solution[i] += a * direction[i];
+    residual[i] -= a * product[i];
+    return std::array{residual[i] * residual[i]};
+  })[0];
 }
 
 template <class S>

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <span>
 #include <type_traits>
@@ -20,8 +21,6 @@
 namespace kerf::cpu {
 
 using kernels::Vec3;
-
-inline constexpr std::int32_t kChunk = 512;  // scalars a lane that a dot product sums together
 
 template <class T>
 std::size_t bytes_of(const std::vector<T>& array) {
@@ -116,6 +115,10 @@ class FastBackend final : public Backend {
   void apply(int level, int in, int out) override;
   void precondition_jacobi(int level, int in, int out) override;
 
+  std::array<double, 2> dots(int x, int y, int z) override;
+  std::array<double, 2> advance_direction(int z, double beta, int d, int q, int r) override;
+  double advance_solution(double a, int d, int q, int x, int r) override;
+
   void elastic_force(int displacement, int out) override;
   void apply_scaled(const OperatorScale& scale, int in, int out) override;
   void move_points(std::span<const BoundPoint> points, int displacement,
@@ -155,15 +158,15 @@ class FastBackend final : public Backend {
   template <class T>
   T* partial_sums(std::size_t scalars);
   template <class T, class Before, class Own, class Cells, class Finish>
-  double sweep(int level, const Before& before, const Own& own, const T* u, const Cells& cells,
+  Sums sweep(int level, const Before& before, const Own& own, const T* u, const Cells& cells,
                const Finish& finish);
   template <class T>
   void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
                     T* y) const;
   template <class T>
-  double apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
-  template <class A, class B>
-  double dot_typed(const A* a, const B* b, std::int32_t size) const;
+  void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
+  template <std::size_t kSums, class Body>
+  std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
   void add_children(const FastLevel<S>& from, bool finest,
                     const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
   void chebyshev(int level);
@@ -217,13 +220,13 @@ T* FastBackend<S>::partial_sums(std::size_t scalars) {
 /// returns, in an order that threads do not change.
 template <class S>
 template <class T, class Before, class Own, class Cells, class Finish>
-double FastBackend<S>::sweep(int level, const Before& before, const Own& own, const T* u,
-                             const Cells& cells, const Finish& finish) {
+Sums FastBackend<S>::sweep(int level, const Before& before, const Own& own, const T* u,
+                           const Cells& cells, const Finish& finish) {
   const PatchedLevel& l = levels_[level].patched;
   const auto patches = static_cast<std::int32_t>(l.patches.size());
   const std::int32_t first_shared = l.first_shared / kGroup, tiles = levels_[level].tiles();
   T* const partial = partial_sums<T>(4 * l.copy_point.size());
-  std::vector<double> sums(l.patches.size() + static_cast<std::size_t>(tiles - first_shared));
+  std::vector<Sums> sums(l.patches.size() + static_cast<std::size_t>(tiles - first_shared));
 #pragma omp parallel num_threads(threads_) if (patches > 1)
   {
 #pragma omp for schedule(static)
@@ -240,7 +243,7 @@ double FastBackend<S>::sweep(int level, const Before& before, const Own& own, co
 #pragma omp for schedule(static)
     for (std::int32_t t = first_shared; t < tiles; ++t) {
       const auto tile = static_cast<std::size_t>(t);
-      double sum = 0;
+      Sums sum;
       for_packs<T>([&](int first) {
         sum += finish(tile, first, shared_sums(l, tile, first, partial),
                       [&] { return load_tile(u, tile, first); });
@@ -248,8 +251,8 @@ double FastBackend<S>::sweep(int level, const Before& before, const Own& own, co
       sums[l.patches.size() + static_cast<std::size_t>(t - first_shared)] = sum;
     }
   }
-  double sum = 0;
-  for (const double one : sums) sum += one;
+  Sums sum;
+  for (const Sums& one : sums) sum += one;
   return sum;
 }
 
@@ -265,27 +268,32 @@ void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::si
   }
 }
 
+/// Sums of body(i, eight sums) over scalars i: fixed chunks, summed in their order, eight sums side
+/// by side in each. The same bits for any number of threads.
 template <class S>
-template <class A, class B>
-double FastBackend<S>::dot_typed(const A* a, const B* b, std::int32_t size) const {
-  constexpr std::int32_t kLanes = 8;
-  const std::int32_t chunks = (size + kChunk * kLanes - 1) / (kChunk * kLanes);
-  std::vector<double> part(static_cast<std::size_t>(chunks));
-  parallel(chunks, kWorthScalars / (kChunk * kLanes), [&](std::int32_t chunk) {
-    double sums[kLanes] = {};
-    std::int32_t i = chunk * kChunk * kLanes;
-    const std::int32_t end = std::min(size, i + kChunk * kLanes);
-    for (; i + kLanes <= end; i += kLanes)
-      for (int k = 0; k < kLanes; ++k)
-        sums[k] += static_cast<double>(a[i + k]) * static_cast<double>(b[i + k]);
-    for (int k = 0; i < end; ++i, ++k)
-      sums[k] += static_cast<double>(a[i]) * static_cast<double>(b[i]);
-    part[static_cast<std::size_t>(chunk)] =
-        ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+template <std::size_t kSums, class Body>
+std::array<double, kSums> FastBackend<S>::sum_scalars(std::int32_t size, const Body& body) const {
+  constexpr std::int32_t kChunk = 4096, kLanes = 8;
+  const std::int32_t chunks = (size + kChunk - 1) / kChunk;
+  std::vector<std::array<double, kSums>> part(static_cast<std::size_t>(chunks));
+  parallel(chunks, kWorthScalars / kChunk, [&](std::int32_t chunk) {
+    double sums[kSums][kLanes] = {};
+    const std::int32_t begin = chunk * kChunk, end = std::min(size, begin + kChunk);
+    for (std::int32_t i = begin; i < end; i += kLanes)  // whole tiles
+      for (int k = 0; k < kLanes; ++k) {
+        const std::array<double, kSums> one = body(i + k);
+        for (std::size_t n = 0; n < kSums; ++n) sums[n][k] += one[n];
+      }
+    for (std::size_t n = 0; n < kSums; ++n) {
+      const double* s = sums[n];
+      part[static_cast<std::size_t>(chunk)][n] =
+          ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+    }
   });
-  double sum = 0;
-  for (const double p : part) sum += p;
-  return sum;
+  std::array<double, kSums> out{};
+  for (const auto& p : part)
+    for (std::size_t n = 0; n < kSums; ++n) out[n] += p[n];
+  return out;
 }
 
 }  // namespace kerf::cpu

@@ -57,6 +57,42 @@ void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>&
   store_pack(to + 2 * kGroup, v.z);
 }
 
+/// The same from a vector of any precision.
+template <class S, class From>
+kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) {
+  typedef From Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(From))));
+  kernels::Vec3<Pack<S>> out;
+  for (int c = 0; c < 3; ++c) {
+    Narrow narrow;
+    __builtin_memcpy(&narrow, x + kTileScalars * tile + kGroup * c + first, sizeof narrow);
+    out[c].v = __builtin_convertvector(narrow, typename Pack<S>::Vector);
+  }
+  return out;
+}
+
+/// Lane by lane in the order of the lanes.
+template <class S>
+double sum_lanes(const Pack<S>& pack) {
+  double sum = 0;
+  for (int k = 0; k < Pack<S>::kLanes; ++k) sum += static_cast<double>(pack[k]);
+  return sum;
+}
+template <class S>
+double dot_lanes(const kernels::Vec3<Pack<S>>& a, const kernels::Vec3<Pack<S>>& b) {
+  return sum_lanes(fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)));
+}
+
+/// What a pass over vertices sums beside its work.
+struct Sums {
+  double first = 0, second = 0;
+
+  Sums& operator+=(const Sums& b) {
+    first += b.first;
+    second += b.second;
+    return *this;
+  }
+};
+
 /// Zero where a component is held.
 template <class S>
 kernels::Vec3<Pack<S>> masked(kernels::Vec3<Pack<S>> v, const std::uint8_t* fixed) {
@@ -116,9 +152,9 @@ class PatchPoints {
   /// and a function for the x they had; shared vertices to `partial`, by copy. Returns the sum of
   /// what finish returns, in a fixed order.
   template <class Finish>
-  double store(const Finish& finish, S* partial) {
+  Sums store(const Finish& finish, S* partial) {
     gather_hanging();
-    double sum = 0;
+    Sums sum;
     const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
     for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
       for_packs<S>([&](int first) {

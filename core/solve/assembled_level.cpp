@@ -70,9 +70,8 @@ void AssembledLevel::assemble(const Level& level, const ReadCell& read_cell) {
       if ((level.fixed[v] >> c) & 1) value[column_begin[3 * v + c]] = 1;
 }
 
-void AssembledLevel::strengthen_diagonal() {
-  constexpr double kShare = 1e-12;  // far above rounding, far below the softest bending
-  for (int i = 0; i < unknowns(); ++i) value[column_begin[i]] *= 1 + kShare;
+void AssembledLevel::strengthen_diagonal(double share) {
+  for (int i = 0; i < unknowns(); ++i) value[column_begin[i]] *= 1 + share;
 }
 
 }  // namespace kerf

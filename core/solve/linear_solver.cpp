@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/solve/linear_solver.hpp"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -119,23 +120,18 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
     bool first = true;
     while (stats.cycles < limit && (fixed || norm > goal)) {
       precondition(jacobi);
-      const double rho_next = backend_.dot(0, kSolution, residual_);
+      const auto [rho_next, overlap] =
+          first ? std::array{backend_.dot(0, kSolution, residual_), 0.0}
+                : backend_.dots(kSolution, residual_, product_);
       if (!(rho_next > 0)) break;  // r is zero, or rounding has won
-      if (first) {
-        backend_.copy(0, kSolution, direction_);
-      } else {
-        const double beta = -alpha * backend_.dot(0, kSolution, product_) / rho;
-        backend_.combine(0, 1, kSolution, beta, direction_);
-      }
+      const double beta = first ? 0 : -alpha * overlap / rho;
       first = false;
-      backend_.apply(0, direction_, product_);
-      const double curvature = backend_.dot(0, direction_, product_);
+      const auto [curvature, slope] =
+          backend_.advance_direction(kSolution, beta, direction_, product_, residual_);
       if (!(curvature > 0)) break;
       rho = rho_next;
-      alpha = backend_.dot(0, direction_, residual_) / curvature;
-      backend_.add(0, alpha, direction_, x);
-      backend_.add(0, -alpha, product_, residual_);
-      norm = std::sqrt(backend_.dot(0, residual_, residual_));
+      alpha = slope / curvature;
+      norm = std::sqrt(backend_.advance_solution(alpha, direction_, product_, x, residual_));
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / reference);
     }

@@ -26,9 +26,11 @@ class AssembledLevel {
   void assemble(const Level& level, const ReadCell& read_cell);
   /// For Galerkin matrices of a coarse level. Where supports hold most vertices of a few fine
   /// cells, fewer free ones are left than the coarse vertices above them, and the matrix is
-  /// singular, though the body is held. A relative 1e-12 on the diagonal makes it definite; what it
-  /// changes the transfer to the finer level sends to zero.
-  void strengthen_diagonal();
+  /// singular, though the body is held. A relative share of the diagonal makes it definite, if it
+  /// is far above the rounding of the matrices; what it changes the transfer to the finer level
+  /// sends to zero.
+  void strengthen_diagonal(double share);
+  static constexpr double kShare = 1e-12;  ///< of matrices in double
 
   int unknowns() const { return static_cast<int>(column_begin.size()) - 1; }
   std::vector<int> column_begin;  ///< per unknown + 1
