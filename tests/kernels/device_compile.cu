@@ -9,6 +9,7 @@
 #include "kernels/host_device.hpp"
 #include "kernels/layout.hpp"
 #include "kernels/mat3.hpp"
+#include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
 #include "kernels/relax.hpp"
 #include "kernels/residual.hpp"
@@ -52,9 +53,46 @@ __global__ void touch_all(const Vec3<T>* displacement, Quat<T>* rotation, T* mat
   force[cell] += unit_or_z(area_normal(trilinear(corners, f[0]), f[1], f[2]));
 }
 
+/// One thread a parent in the mode basis: from finest cells, and from eight parents like it.
+template <bool with_translations, class T>
+__global__ void touch_modes(const FinestChild<T>* finest, T* corners, T* matrices, T* coarse,
+                            Vec3<T>* u, Sym3<T>* blocks, int cells, T poisson, unsigned present) {
+  const int cell = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (cell >= cells) return;
+  FinestChild<T> children[kCorners];
+  for (int o = 0; o < kCorners; ++o) children[o] = finest[kCorners * cell + o];
+  const ModeConstants<T> constants = mode_constants(poisson, MassModel::lumped);
+  const Mat3<T> R = to_matrix(children[0].rotation);
+
+  constexpr int kTileLog2 = 5;
+  const auto entries = [=](T* tiles, int at) {
+    return cell_entries(tiles, at, kEntries, kTileLog2);
+  };
+  const auto matrix = entries(matrices, cell);
+  finest_mode_matrix(R, children[0].stiffness, children[0].mass, constants, matrix);
+  coarsen_finest<with_translations>(children, constants, matrix);
+  coarsen_modes<with_translations, T>([&](int o) { return entries(matrices, cell + o); }, present,
+                                      entries(coarse, cell));
+  corners_from_modes<T>(matrix, entries(corners, cell));
+  modes_from_corners<T>(entries(corners, cell), matrix);
+
+  Sym3<T> D[kCorners];
+  finest_diagonal_blocks(R, children[0].stiffness, children[0].mass, constants, D);
+  blocks[cell] = D[0];
+  mode_diagonal_blocks<with_translations>(matrix, D);
+  blocks[cell] += D[0];
+  Vec3<T> f[kCorners];
+  for (int i = 0; i < kCorners; ++i) f[i] = u[kCorners * cell + i];
+  apply_mode_matrix<with_translations>(matrix, f, f);
+  for (int i = 0; i < kCorners; ++i) u[kCorners * cell + i] = f[i];
+}
+
 template __global__ void touch_all<float>(const Vec3<float>*, Quat<float>*, float*, float*,
                                           Vec3<float>*, int, float, float, FoldCode);
 template __global__ void touch_all<double>(const Vec3<double>*, Quat<double>*, double*, double*,
                                            Vec3<double>*, int, double, double, FoldCode);
+// Once: unrolled as it is, it takes nvcc half a minute.
+template __global__ void touch_modes<true, float>(const FinestChild<float>*, float*, float*, float*,
+                                                  Vec3<float>*, Sym3<float>*, int, float, unsigned);
 
 }  // namespace kerf::kernels
