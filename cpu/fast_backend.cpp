@@ -31,7 +31,7 @@ std::size_t FastBackend<S>::bytes() const {
                     bytes_of(exact_.rotation) + bytes_of(single_.rotation) +
                     bytes_of(exact_.materials) + bytes_of(single_.materials);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.patched.bytes() + bytes_of(level.matrices) + bytes_of(level.inverse_diagonal);
+    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal);
     for (const FastVector& vector : level.vectors)
       sum += bytes_of(vector.single) + bytes_of(vector.exact);
   }
@@ -86,7 +86,8 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
-    level.patched = make_patches(hierarchy, l, threads_);
+    level.patched =
+        make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
     if (l > 0) fill_weights(level.patched, levels_[l - 1].patched);
     level.bound = 0;
     level.solution_is_zero = false;
@@ -94,7 +95,6 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
     for (std::size_t x = 0; x < level.vectors.size(); ++x)
       allocate(level.vectors[x], level.patched, x >= kLevelVectors);
     level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
-    level.matrices.assign(l == 0 ? 0 : kEntries * level.patched.cell.size(), 0);
   }
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
@@ -222,9 +222,9 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
 // The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
 // there are some the way from corners has two steps.
 template <class S>
-void FastBackend<S>::add_children(const FastLevel<S>& from, bool finest,
-                                  const std::int32_t (&child)[Pack<S>::kLanes],
-                                  Pack<S> (&sum)[kEntries]) const {
+void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
+                                       const std::int32_t (&child)[Pack<S>::kLanes],
+                                       Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel& packed = from.patched;
   P full[24][24];
@@ -236,7 +236,11 @@ void FastBackend<S>::add_children(const FastLevel<S>& from, bool finest,
     if (lanes.any_fixed && lanes.any_folded) fold_matrices<P>(packed, child, full);
     if (lanes.any_fixed) mask_matrices(packed, lanes, full);
   } else {
-    stored_matrices(packed, from.matrices.data(), child, full);
+    std::int32_t lanes[P::kLanes];
+    for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
+    P entries[kEntries];
+    from.matrices.gather(lanes, entries);
+    full_from_modes(entries, full);
   }
   Weights weights[P::kLanes];
   const Weights* w[P::kLanes];
@@ -250,32 +254,50 @@ void FastBackend<S>::add_children(const FastLevel<S>& from, bool finest,
 }
 
 template <class S>
+void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
+                                Pack<S> (&out)[kEntries]) const {
+  using P = Pack<S>;
+  const PatchedLevel& to = levels_[fine + 1].patched;
+  const Level& coarse = *to.level;
+  const std::int32_t* cells = to.cell.data() + kGroup * group + first;
+  for (P& entry : out) entry = P{};
+  for (std::int32_t n = 0;; ++n) {
+    std::int32_t child[P::kLanes];
+    bool any = false;
+    for (int k = 0; k < P::kLanes; ++k) {
+      child[k] = -1;
+      if (cells[k] < 0) continue;
+      const std::int32_t at = coarse.child_begin[cells[k]] + n;
+      if (at >= coarse.child_begin[cells[k] + 1]) continue;
+      child[k] = coarse.children[at];
+      any = true;
+    }
+    if (!any) break;
+    add_general_children(levels_[fine], fine == 0, child, out);
+  }
+  kernels::modes_from_corners<P>(out, out);
+}
+
+template <class S>
 void FastBackend<S>::coarsen(int fine) {
   using P = Pack<S>;
   const FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
-  const Level& coarse = *to.patched.level;
-  const auto groups = static_cast<std::int32_t>(to.patched.groups());
-  parallel(groups, kWorthGroups, [&](std::int32_t g) {
+  const PatchedLevel& packed = to.patched;
+  to.matrices.allocate(packed, fine == 0, scale_.mass != 0);
+  parallel(static_cast<std::int32_t>(packed.groups()), kWorthGroups, [&](std::int32_t g) {
+    const auto group = static_cast<std::size_t>(g);
+    const bool passed = packed.kind[group] == kPassed;
     for_packs<S>([&](int first) {
-      const std::int32_t* cells = to.patched.cell.data() + kGroup * g + first;
-      P sum[kEntries] = {};
-      for (std::int32_t n = 0;; ++n) {
-        std::int32_t child[P::kLanes];
-        bool any = false;
-        for (int k = 0; k < P::kLanes; ++k) {
-          child[k] = -1;
-          if (cells[k] < 0) continue;
-          const std::int32_t at = coarse.child_begin[cells[k]] + n;
-          if (at >= coarse.child_begin[cells[k] + 1]) continue;
-          child[k] = coarse.children[at];
-          any = true;
-        }
-        if (!any) break;
-        add_children(from, fine == 0, child, sum);
-      }
-      S* tile = to.matrices.data() + kEntries * kGroup * static_cast<std::size_t>(g) + first;
-      for (int e = 0; e < kEntries; ++e) store_pack(tile + kGroup * e, sum[e]);
+      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
+      P out[kEntries];
+      if (packed.kind[group] == kGeneral)
+        merge_general(fine, group, first, out);
+      else if (fine == 0)
+        merge_finest(from.patched, values_of<S>(), scale_, children, passed, out);
+      else
+        merge_stored(from.matrices, children, passed, scale_.mass != 0, out);
+      to.matrices.store(group, first, out);
     });
   });
 }
@@ -329,7 +351,7 @@ void FastBackend<S>::prepare(int level) {
       if (level == 0)
         add_finest_diagonals(packed, values_of<S>(), scale_, group, to);
       else
-        add_stored_diagonals(packed, l.matrices.data(), group, to);
+        add_stored_diagonals(packed, l.matrices, group, to);
     }
     invert_own(l, patch, to);
     for (std::int32_t k = patch.first_copy; k < patch.first_copy + patch.copies; ++k) {
@@ -361,14 +383,14 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
     if (lanes.any_folded) fold_matrices<P>(l.patched, cells, full);
     if (lanes.any_fixed) mask_matrices(l.patched, lanes, full);
   } else {
-    const auto lane = static_cast<std::size_t>(l.patched.lane[cell]);
-    const S* tile = l.matrices.data() + kEntries * kGroup * (lane / kGroup) + lane % kGroup;
-    for (int i = 0; i < 24; ++i)
-      for (int j = 0; j <= i; ++j) {
-        const auto e = static_cast<std::size_t>(kernels::packed_index(i, j));
-        full[i][j].set(0, tile[kGroup * e]);
-        full[j][i].set(0, tile[kGroup * e]);
-      }
+    std::int32_t lanes[Pack<S>::kLanes];
+    std::fill(std::begin(lanes), std::end(lanes), -1);
+    lanes[0] = l.patched.lane[cell];
+    Pack<S> entries[kEntries];
+    P exact[kEntries];
+    l.matrices.gather(lanes, entries);
+    for (int e = 0; e < kEntries; ++e) exact[e] = P(static_cast<double>(entries[e][0]));
+    full_from_modes(exact, full);
     if (kernels::has_hanging(l.patched.level->fold[cell])) fold_matrices<P>(l.patched, cells, full);
   }
   for (int i = 0; i < 24; ++i)

@@ -10,9 +10,11 @@
 
 #include "core/backend.hpp"
 #include "cpu/patch_sweep.hpp"
+#include "cpu/stored_matrices.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/hex_element.hpp"
+#include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
 #include "kernels/residual.hpp"
 #include "kernels/rotation.hpp"
@@ -57,42 +59,55 @@ inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t
          static_cast<std::size_t>(first);
 }
 
-/// The corners of a group, or of half of it in double. In a row they follow each other along x, so
+/// The corners of a group, or of half of it in double. In rows they follow each other along x, so
 /// that two of them are read and written together and no numbers but the first are.
 /// Inlined, since arrays of packs that a call fills are cleared before.
-template <bool kRow, class S>
+template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
                                                   kernels::Vec3<Pack<S>> (&out)[8]) {
   for (int i = 0; i < 8; i += 2) {
-    if constexpr (kRow) {
-      gather_row(x + 4 * std::size_t(points[kGroup * i]), out[i], out[i + 1]);
-    } else {
+    const S* first = x + 4 * std::size_t(points[kGroup * i]);
+    if constexpr (kKind == kScattered) {
       gather_points(x, points + kGroup * i, out[i]);
       gather_points(x, points + kGroup * (i + 1), out[i + 1]);
+    } else if constexpr (kKind == kTwoRows && std::is_same_v<S, float>) {
+      gather_rows(first, x + 4 * std::size_t(points[kGroup * i + 4]), out[i], out[i + 1]);
+    } else {
+      gather_row(first, out[i], out[i + 1]);
     }
   }
 }
-template <bool kRow, class S>
+template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void add_corners(const std::uint16_t* points,
                                                const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
   for (int i = 0; i < 8; i += 2) {
-    if constexpr (kRow) {
-      add_to_row(y + 4 * std::size_t(points[kGroup * i]), f[i], f[i + 1]);
-    } else {
+    S* first = y + 4 * std::size_t(points[kGroup * i]);
+    if constexpr (kKind == kScattered) {
       add_to_points(y, points + kGroup * i, f[i]);
       add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
+    } else if constexpr (kKind == kTwoRows && std::is_same_v<S, float>) {
+      add_to_rows(first, y + 4 * std::size_t(points[kGroup * i + 4]), f[i], f[i + 1]);
+    } else {
+      add_to_row(first, f[i], f[i + 1]);
     }
   }
 }
 
-/// Calls body(points of the corners, whether they are rows, first lane) for each pack of a group.
+/// Calls body(points of the corners, how they lie, first lane) for each pack of a group.
 template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
   const std::uint16_t* points = level.corners.data() + 8 * kGroup * group;
-  if (level.row[group] != 0)
-    for_packs<S>([&](int first) { body(points + first, std::true_type{}, first); });
-  else
-    for_packs<S>([&](int first) { body(points + first, std::false_type{}, first); });
+  const auto run = [&](auto kind) {
+    for_packs<S>([&](int first) { body(points + first, kind, first); });
+  };
+  switch (level.row[group]) {
+    case kRow:
+      return run(std::integral_constant<RowKind, kRow>{});
+    case kTwoRows:
+      return run(std::integral_constant<RowKind, kTwoRows>{});
+    default:
+      return run(std::integral_constant<RowKind, kScattered>{});
+  }
 }
 
 /// y += A x for a group of level 0.
@@ -117,19 +132,17 @@ void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
 
 /// y += A x for a group of a stored level.
 template <class S>
-void stored_products(const PatchedLevel& level, const S* matrices, std::size_t group, const S* x,
-                     S* y) {
-  using P = Pack<S>;
+void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrices,
+                     std::size_t group, const S* x, S* y) {
   for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
-    const S* tile = matrices + kEntries * kGroup * group + first;
-    kernels::Vec3<P> at[8], f[8];
+    kernels::Vec3<Pack<S>> at[8];
     gather_corners<row()>(points, x, at);
-    struct Entries {
-      const S* tile;
-      P operator[](int entry) const { return load_pack(tile + kGroup * entry); }
-    };
-    kernels::apply_packed(Entries{tile}, at, f);
-    add_corners<row()>(points, f, y);
+    matrices.read(group, first, [&](const auto& entries, const Pack<S>& unit, auto translations) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
+        for (auto& v : at) v *= unit;
+      kernels::apply_mode_matrix<translations()>(entries, at, at);
+    });
+    add_corners<row()>(points, at, y);
   });
 }
 
@@ -222,7 +235,7 @@ struct FinestLanes {
       stiffness.set(k, static_cast<S>(scale.stiffness * kind.stiffness));
       mass.set(k, static_cast<S>(scale.mass * kind.mass));
       any_folded = any_folded || kernels::has_hanging(level.level->fold[cell[k]]);
-      any_fixed = any_fixed || level.has_fixed[cell[k]] != 0;
+      any_fixed = any_fixed || level.held[cell[k]] != 0;
       material = material == -1 || material == kind.material ? kind.material : -2;
     }
     R = kernels::to_matrix(q);
@@ -344,19 +357,11 @@ void mask_matrices(const PatchedLevel& level, const FinestLanes<S>& lanes, Pack<
     for (int j = 0; j < 24; ++j) full[i][j] *= keep[i] * keep[j];
 }
 
-/// Matrices of some cells of a stored level, in full; zero where there is no cell.
-template <class S>
-void stored_matrices(const PatchedLevel& level, const S* matrices, const std::int32_t* cells,
-                     Pack<S> (&full)[24][24]) {
-  using P = Pack<S>;
-  P packed[kEntries] = {};
-  for (int k = 0; k < P::kLanes; ++k) {
-    if (cells[k] < 0) continue;
-    const auto lane = static_cast<std::size_t>(level.lane[cells[k]]);
-    const S* tile = matrices + kEntries * kGroup * (lane / kGroup) + lane % kGroup;
-    for (int e = 0; e < kEntries; ++e) packed[e].set(k, tile[kGroup * e]);
-  }
-  kernels::expand_packed(static_cast<const P*>(packed), full);
+/// Matrices over corners from entries by modes, in full.
+template <class P>
+void full_from_modes(P (&entries)[kEntries], P (&full)[24][24]) {
+  kernels::corners_from_modes<P>(entries, entries);
+  kernels::expand_packed(static_cast<const P*>(entries), full);
 }
 
 /// Symmetric blocks of points, as two records.
@@ -403,31 +408,34 @@ void add_finest_diagonals(const PatchedLevel& level, const FinestValues<S>& valu
       add_folded_diagonals(level, group, first, full, to);
       return;
     }
-    for (int i = 0; i < 8; ++i)
-      to.add(corner_points(level, group, first, i),
-             kernels::cell_diagonal(m.stiffness, m.mass, lanes.R, lanes.stiffness, lanes.mass, i));
+    kernels::Sym3<P> blocks[8];
+    kernels::finest_diagonal_blocks(lanes.R, lanes.stiffness, lanes.mass, m.modes, blocks);
+    for (int i = 0; i < 8; ++i) to.add(corner_points(level, group, first, i), blocks[i]);
   });
 }
 
 /// The same for a group of a stored level.
 template <class S>
-void add_stored_diagonals(const PatchedLevel& level, const S* matrices, std::size_t group,
-                          const BlockPoints<S>& to) {
+void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& matrices,
+                          std::size_t group, const BlockPoints<S>& to) {
   using P = Pack<S>;
   for_packs<S>([&](int first) {
-    const S* tile = matrices + kEntries * kGroup * group + first;
-    struct Entries {
-      const S* tile;
-      P operator[](int entry) const { return load_pack(tile + kGroup * entry); }
-    };
-    if (level.folded[group] != 0) {
-      P full[24][24];
-      kernels::expand_packed(Entries{tile}, full);
-      add_folded_diagonals(level, group, first, full, to);
-      return;
-    }
-    for (int i = 0; i < 8; ++i)
-      to.add(corner_points(level, group, first, i), kernels::packed_diagonal<P>(Entries{tile}, i));
+    matrices.read(group, first, [&](const auto& entries, const P& unit, auto translations) {
+      if (level.folded[group] != 0) {
+        P all[kEntries] = {}, full[24][24];
+        for (int e = 0; e < kernels::kStoredEntries<translations()>; ++e)
+          all[e] = unit * entries[e];
+        full_from_modes(all, full);
+        add_folded_diagonals(level, group, first, full, to);
+        return;
+      }
+      kernels::Sym3<P> blocks[8];
+      kernels::mode_diagonal_blocks<translations()>(entries, blocks);
+      for (int i = 0; i < 8; ++i)
+        to.add(corner_points(level, group, first, i),
+               {unit * blocks[i].xx, unit * blocks[i].xy, unit * blocks[i].xz, unit * blocks[i].yy,
+                unit * blocks[i].yz, unit * blocks[i].zz});
+    });
   });
 }
 
@@ -457,6 +465,106 @@ inline Weights child_weights(const Level& level, std::int32_t child, bool slots)
     kernels::transfer_weights(slots ? level.fold[child] : kernels::FoldCode{0}, place,
                               kernels::FoldCode{0}, out.w);
   return out;
+}
+
+/// The octant's children of a group, as elements: all in lanes `first` on that are of `material`.
+template <class S>
+void load_children(const PatchedLevel& level, const FinestValues<S>& values,
+                   const OperatorScale& scale, const std::int32_t* lanes, int material,
+                   kernels::FinestChild<Pack<S>>& out) {
+  constexpr int kLanes = Pack<S>::kLanes;
+  alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes], mass[kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    q[0][k] = 1;
+    q[1][k] = q[2][k] = q[3][k] = stiffness[k] = mass[k] = 0;
+    if (lanes[k] < 0) continue;
+    const auto lane = static_cast<std::size_t>(lanes[k]);
+    const CellKind& kind = level.kinds[level.kind[lane / kGroup]];
+    if (kind.material != material) continue;
+    const S* from = values.rotation.data() + 4 * kGroup * (lane / kGroup) + lane % kGroup;
+    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
+    stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
+    mass[k] = static_cast<S>(scale.mass * kind.mass);
+  }
+  out.rotation = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+  out.stiffness = load_pack(stiffness);
+  out.mass = load_pack(mass);
+}
+
+/// Which materials the children in some lanes of a group are of, as bits.
+template <class S>
+std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* children) {
+  std::uint64_t out = 0;
+  for (int octant = 0; octant < 8; ++octant)
+    for (int k = 0; k < Pack<S>::kLanes; ++k)
+      if (const std::int32_t lane = children[kGroup * octant + k]; lane >= 0)
+        out |= std::uint64_t{1} << (level.kinds[level.kind[lane / kGroup]].material % 64);
+  return out;
+}
+
+/// Matrices by modes of parents whose children are of level 0, none of them held.
+template <class S>
+void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
+                  const OperatorScale& scale, const std::int32_t* children, bool passed,
+                  Pack<S> (&out)[kEntries]) {
+  using P = Pack<S>;
+  const std::uint64_t materials = materials_of<S>(level, children);
+  bool first = true;
+  for (std::size_t m = 0; m < values.materials.size(); ++m) {
+    if (((materials >> (m % 64)) & 1) == 0) continue;
+    kernels::FinestChild<P> child[8];
+    for (int octant = 0; octant < (passed ? 1 : 8); ++octant)
+      load_children(level, values, scale, children + kGroup * octant, static_cast<int>(m),
+                    child[octant]);
+    const kernels::ModeConstants<P>& constants = values.materials[m].modes;
+    P some[kEntries];
+    P* to = first ? out : some;
+    if (passed)
+      kernels::finest_mode_matrix(kernels::to_matrix(child[0].rotation), child[0].stiffness,
+                                  child[0].mass, constants, to);
+    else if (scale.mass == 0)
+      kernels::coarsen_finest<false>(child, constants, to);
+    else
+      kernels::coarsen_finest<true>(child, constants, to);
+    const int count = passed || scale.mass != 0 ? kEntries : kernels::kModeEntries;
+    if (!first)
+      for (int e = 0; e < count; ++e) out[e] += some[e];
+    first = false;
+  }
+}
+
+/// Matrices by modes of parents whose children are stored, none of them held.
+template <class S>
+void merge_stored(const StoredMatrices<S>& from, const std::int32_t* children, bool passed,
+                  bool with_mass, Pack<S> (&out)[kEntries]) {
+  using P = Pack<S>;
+  const auto lanes_of = [&](int octant, std::int32_t(&lanes)[P::kLanes]) {
+    bool any = false;
+    for (int k = 0; k < P::kLanes; ++k) {
+      lanes[k] = children[kGroup * octant + k];
+      any = any || lanes[k] >= 0;
+    }
+    return any;
+  };
+  std::int32_t lanes[P::kLanes];
+  if (passed) {
+    lanes_of(0, lanes);
+    from.gather(lanes, out);
+    return;
+  }
+  unsigned present = 0;
+  for (int octant = 0; octant < 8; ++octant)
+    if (lanes_of(octant, lanes)) present |= 1U << octant;
+  P scratch[2][kEntries];
+  const auto child = [&](int octant) {
+    lanes_of(octant, lanes);
+    from.gather(lanes, scratch[octant & 1]);
+    return static_cast<const P*>(scratch[octant & 1]);
+  };
+  if (with_mass)
+    kernels::coarsen_modes<true, P>(child, present, static_cast<P*>(out));
+  else
+    kernels::coarsen_modes<false, P>(child, present, static_cast<P*>(out));
 }
 
 }  // namespace kerf::cpu

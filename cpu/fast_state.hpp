@@ -57,7 +57,7 @@ void with_types(From& from, To& to, const Body& body) {
 template <class S>
 struct FastLevel {
   PatchedLevel patched;
-  std::vector<S> matrices;          // [group][300][8], levels above 0
+  StoredMatrices<S> matrices;       // levels above 0
   std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][8]
   std::vector<FastVector> vectors;  // by VectorId
   double bound = 0;                 // of the spectrum of D^-1 A
@@ -167,8 +167,10 @@ class FastBackend final : public Backend {
   void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
-  void add_children(const FastLevel<S>& from, bool finest,
-                    const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
+  void add_general_children(const FastLevel<S>& from, bool finest,
+                         const std::int32_t (&child)[Pack<S>::kLanes],
+                         Pack<S> (&sum)[kEntries]) const;
+  void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
   void chebyshev(int level);
   void load_coarse_records(int coarse);
   Vec3<Pack<S>> correction(const FastLevel<S>& to, std::size_t tile, int first) const;
@@ -264,7 +266,7 @@ void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::si
   if (level == 0) {
     finest_products(l.patched, values_of<T>(), scale, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
-    stored_products(l.patched, l.matrices.data(), group, x, y);
+    stored_products(l.patched, l.matrices, group, x, y);
   }
 }
 

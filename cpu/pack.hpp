@@ -214,15 +214,16 @@ void for_records(const kernels::Vec3<Pack<double>>& f, const Body& body) {
 #endif
 }
 
-// The left and right ends of a row of cells, whose points follow each other: lane k has points k
-// and k + 1 from `first` on. Results by reference: GCC 12 copies structs of packs by halves of
-// 64 bits.
-inline void gather_row(const float* first, kernels::Vec3<Pack<float>>& left,
-                       kernels::Vec3<Pack<float>>& right) {
+// The left and right ends of rows of four cells, whose points follow each other: a lane has points
+// k and k + 1 of its row. Results by reference: GCC 12 copies structs of packs by halves of 64 bits.
+
+/// Two rows, from points `low` and `high` on.
+inline void gather_rows(const float* low, const float* high, kernels::Vec3<Pack<float>>& left,
+                        kernels::Vec3<Pack<float>>& right) {
 #if defined(__AVX2__) && defined(__FMA__)
-  const auto pair = [&](int low) {
-    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(first + 4 * low)),
-                                _mm_load_ps(first + 4 * low + 16), 1);
+  const auto pair = [&](int k) {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_load_ps(low + 4 * k)),
+                                _mm_load_ps(high + 4 * k), 1);
   };
   const __m256 a = pair(0), b = pair(1), c = pair(2), d = pair(3), e = pair(4);
   const __m256 ab_low = _mm256_unpacklo_ps(a, b), ab_high = _mm256_unpackhi_ps(a, b);
@@ -236,12 +237,19 @@ inline void gather_row(const float* first, kernels::Vec3<Pack<float>>& left,
   right.y.v = _mm256_shuffle_ps(bc_low, de_low, 0xEE);
   right.z.v = _mm256_shuffle_ps(bc_high, de_high, 0x44);
 #else
-  for (int i = 0; i < 8; ++i)
+  for (int i = 0; i < 8; ++i) {
+    const float* from = i < 4 ? low + 4 * i : high + 4 * (i - 4);
     for (int c = 0; c < 3; ++c) {
-      left[c].set(i, first[4 * i + c]);
-      right[c].set(i, first[4 * i + 4 + c]);
+      left[c].set(i, from[c]);
+      right[c].set(i, from[4 + c]);
     }
+  }
 #endif
+}
+/// One row of eight.
+inline void gather_row(const float* first, kernels::Vec3<Pack<float>>& left,
+                       kernels::Vec3<Pack<float>>& right) {
+  gather_rows(first, first + 16, left, right);
 }
 inline void gather_row(const double* first, kernels::Vec3<Pack<double>>& left,
                        kernels::Vec3<Pack<double>>& right) {
@@ -268,7 +276,41 @@ inline void gather_row(const double* first, kernels::Vec3<Pack<double>>& left,
 #endif
 }
 
-/// Adds the ends of a row to its points: what two cells give to a point is summed first.
+/// Adds the ends of two rows to their points: what two cells give to a point is summed first.
+inline void add_to_rows(float* low, float* high, const kernels::Vec3<Pack<float>>& left,
+                        const kernels::Vec3<Pack<float>>& right) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const auto merged = [](const Pack<float>& l, const Pack<float>& r) {
+    const __m256 turned = _mm256_permute_ps(__m256(r.v), 0x93);  // lanes 3 0 1 2 of each half
+    return _mm256_add_ps(__m256(l.v), _mm256_blend_ps(turned, _mm256_setzero_ps(), 0x11));
+  };
+  const __m256 x = merged(left.x, right.x), y = merged(left.y, right.y);
+  const __m256 z = merged(left.z, right.z), zero = _mm256_setzero_ps();
+  const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
+  const __m256 z0_low = _mm256_unpacklo_ps(z, zero), z0_high = _mm256_unpackhi_ps(z, zero);
+  const auto add = [&](int point, __m256 both) {
+    float *a = low + 4 * point, *b = high + 4 * point;
+    _mm_store_ps(a, _mm_add_ps(_mm_load_ps(a), _mm256_castps256_ps128(both)));
+    _mm_store_ps(b, _mm_add_ps(_mm_load_ps(b), _mm256_extractf128_ps(both, 1)));
+  };
+  add(0, _mm256_shuffle_ps(xy_low, z0_low, 0x44));
+  add(1, _mm256_shuffle_ps(xy_low, z0_low, 0xEE));
+  add(2, _mm256_shuffle_ps(xy_high, z0_high, 0x44));
+  add(3, _mm256_shuffle_ps(xy_high, z0_high, 0xEE));
+  add(4, _mm256_shuffle_ps(_mm256_unpackhi_ps(__m256(right.x.v), __m256(right.y.v)),
+                           _mm256_unpackhi_ps(__m256(right.z.v), zero), 0xEE));
+#else
+  for (int half = 0; half < 2; ++half) {
+    float* to = half == 0 ? low : high;
+    for (int c = 0; c < 3; ++c) {
+      to[c] += left[c][4 * half];
+      for (int i = 1; i < 4; ++i) to[4 * i + c] += left[c][4 * half + i] + right[c][4 * half + i - 1];
+      to[16 + c] += right[c][4 * half + 3];
+    }
+  }
+#endif
+}
+/// The same for one row of eight.
 inline void add_to_row(float* first, const kernels::Vec3<Pack<float>>& left,
                        const kernels::Vec3<Pack<float>>& right) {
 #if defined(__AVX2__) && defined(__FMA__)

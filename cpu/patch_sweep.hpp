@@ -184,16 +184,16 @@ class PatchPoints {
   }
 
   void interpolate_hanging() {
-    for (std::int32_t h = 0; h < patch_.hanging; ++h) {
-      const auto& m = level_.hanging_masters[patch_.first_hanging + h];
-      write(x_, std::size_t(patch_.hanging_point + h),
+    for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
+      const auto& m = level_.hanging_masters[h];
+      write(x_, level_.hanging_point[h],
             S(0.25) * ((read(x_, m[0]) + read(x_, m[1])) + (read(x_, m[2]) + read(x_, m[3]))));
     }
   }
   void gather_hanging() {
-    for (std::int32_t h = 0; h < patch_.hanging; ++h) {
-      const R share = S(0.25) * read(y_, std::size_t(patch_.hanging_point + h));
-      for (const std::uint16_t m : level_.hanging_masters[patch_.first_hanging + h])
+    for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
+      const R share = S(0.25) * read(y_, level_.hanging_point[h]);
+      for (const std::uint16_t m : level_.hanging_masters[h])
         write(y_, m, read(y_, m) + share);
     }
   }

@@ -44,159 +44,225 @@ std::int32_t patch_cells(std::int32_t cells) {
   return size;
 }
 
+using Corners = std::array<std::uint16_t, 8>;
+constexpr std::uint16_t kNothing = 0xFFFF;
+
 /// A patch before its numbers are known to the level.
 struct Draft {
-  std::vector<std::int32_t> cells;     // per lane, -1: none
-  std::vector<std::uint16_t> corners;  // [group][8][8]
-  std::vector<std::uint16_t> slots;    // the same, of the groups that are folded
-  std::vector<std::uint8_t> row;       // per group
-  std::vector<std::uint8_t> folded;    // per group
-  std::vector<std::uint16_t> kind;     // per group
-  std::vector<std::int32_t> vertices;  // of the level, ascending: points 0 ..
+  std::vector<std::int32_t> cells;          // per lane, -1: none
+  std::vector<std::uint16_t> corners;       // [group][8][8]
+  std::vector<std::uint16_t> slots;         // the same, of the groups that are folded
+  std::vector<std::uint8_t> folded;         // per group
+  std::vector<std::uint8_t> row;            // per group
+  std::vector<std::uint16_t> kind;          // per group
+  std::vector<std::int32_t> vertices;       // of the level, ascending by their points
+  std::vector<std::uint16_t> vertex_point;  // rising
+  std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> masters;
 };
 
-/// Points of the level's vertices within one patch after the other.
+/// Orders points by z, then y, then x, so that rows of cells have rows of points.
+std::uint64_t place_key(const Vec3i& p) {
+  const auto at = [&](std::size_t d) { return static_cast<std::uint64_t>(p[d]) & 0x1FFFFF; };
+  return at(2) << 42 | at(1) << 21 | at(0);
+}
+
+/// The points of one patch after the other.
 class Numbering {
  public:
-  explicit Numbering(std::size_t vertices) : point_(vertices, -1) {}
+  explicit Numbering(const Level& level) : level_(level), first_(level.point.size(), -1) {}
 
-  void begin(const Level& level, const std::vector<std::int32_t>& cells,
-             std::vector<std::int32_t>& vertices) {
-    for (const std::int32_t c : cells) {
-      if (c < 0) continue;
-      for (const std::int32_t v : level.slots[c]) {
-        if (point_[v] >= 0) continue;
-        point_[v] = 0;
-        vertices.push_back(v);
-      }
+  /// Corners and slots of the draft's cells, as points.
+  void number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots) {
+    places_.clear();
+    hanging_.clear();
+    for (const std::int32_t c : draft.cells) {
+      slots.emplace_back();
+      for (std::size_t i = 0; i < 8; ++i) slots.back()[i] = vertex(level_.slots[c][i], draft);
     }
-    std::sort(vertices.begin(), vertices.end());
-    for (std::size_t k = 0; k < vertices.size(); ++k) point_[vertices[k]] = size_of(k);
+    const std::size_t vertices = draft.vertices.size();
+    for (std::size_t n = 0; n < draft.cells.size(); ++n) corners.push_back(corners_of(draft, n, slots[n]));
+    for (const std::int32_t v : draft.vertices) first_[v] = -1;
+    sort(draft, vertices);
+    for (auto* all : {&corners, &slots})
+      for (Corners& of : *all)
+        for (std::uint16_t& point : of) point = rank_[point];
   }
-  void end(const std::vector<std::int32_t>& vertices) {
-    for (const std::int32_t v : vertices) point_[v] = -1;
-  }
-  std::uint16_t operator()(std::int32_t v) const { return static_cast<std::uint16_t>(point_[v]); }
 
  private:
-  std::vector<std::int32_t> point_;
+  std::uint16_t vertex(std::int32_t v, Draft& draft) {
+    if (first_[v] < 0) {
+      first_[v] = size_of(draft.vertices.size());
+      draft.vertices.push_back(v);
+      places_.push_back(place_key(level_.point[v]));
+    }
+    return static_cast<std::uint16_t>(first_[v]);
+  }
+
+  Corners corners_of(Draft& draft, std::size_t n, const Corners& slots) {
+    const std::int32_t cell = draft.cells[n];
+    const kernels::FoldCode fold = level_.fold[cell];
+    Corners out = slots;
+    if (!kernels::has_hanging(fold)) return out;
+    for (int i = 0; i < 8; ++i) {
+      if (!kernels::is_hanging(fold, i)) continue;
+      const auto masters = masters_of(slots, kernels::fold_octant(fold), i);
+      const std::uint64_t key = std::uint64_t{masters[0]} | std::uint64_t{masters[1]} << 16 |
+                                std::uint64_t{masters[2]} << 32 | std::uint64_t{masters[3]} << 48;
+      const auto [entry, added] = hanging_.try_emplace(key, size_of(places_.size()));
+      if (added) {
+        Vec3i p = level_.corner[cell];
+        for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) << level_.size_log2[cell];
+        places_.push_back(place_key(p));
+        draft.masters.push_back(masters);
+      }
+      out[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(entry->second);
+    }
+    return out;
+  }
+
+  /// The points that a hanging corner is the mean of.
+  static std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int corner) {
+    std::array<std::uint16_t, 4> out{};
+    std::size_t n = 0;
+    for (int j = 0; j < 8; ++j)
+      if (kernels::is_between(octant, corner, j)) out[n++] = slots[static_cast<std::size_t>(j)];
+    if (n == 2) out[2] = out[0], out[3] = out[1];
+    std::sort(out.begin(), out.end());
+    return out;
+  }
+
+  /// From the order in which points were met to that of their places.
+  void sort(Draft& draft, std::size_t vertices) {
+    ensures(places_.size() < kNothing, "a patch has too many points");
+    order_.resize(places_.size());
+    for (std::size_t k = 0; k < places_.size(); ++k)
+      order_[k] = {places_[k], k < vertices ? draft.vertices[k] : INT32_MAX,
+                   static_cast<std::uint16_t>(k)};
+    std::sort(order_.begin(), order_.end());
+    rank_.resize(places_.size());
+    std::vector<std::int32_t> sorted;
+    sorted.reserve(vertices);
+    draft.hanging_point.resize(draft.masters.size());
+    for (std::size_t rank = 0; rank < order_.size(); ++rank) {
+      const std::size_t k = std::get<2>(order_[rank]);
+      rank_[k] = static_cast<std::uint16_t>(rank);
+      if (k < vertices) {
+        sorted.push_back(draft.vertices[k]);
+        draft.vertex_point.push_back(rank_[k]);
+      } else {
+        draft.hanging_point[k - vertices] = rank_[k];
+      }
+    }
+    draft.vertices = std::move(sorted);
+    for (auto& masters : draft.masters)
+      for (std::uint16_t& m : masters) m = rank_[m];
+  }
+
+  const Level& level_;
+  std::vector<std::int32_t> first_;
+  std::vector<std::uint64_t> places_;  // of points as they were met: vertices, then hanging ones
+  std::vector<std::tuple<std::uint64_t, std::int32_t, std::uint16_t>> order_;
+  std::vector<std::uint16_t> rank_;
+  std::unordered_map<std::uint64_t, std::int32_t> hanging_;
 };
 
-/// The points that a hanging corner is the mean of.
-std::array<std::uint16_t, 4> masters_of(const std::array<std::uint16_t, 8>& slots, int octant,
-                                        int corner) {
-  std::array<std::uint16_t, 4> out{};
-  std::size_t n = 0;
-  for (int j = 0; j < 8; ++j)
-    if (kernels::is_between(octant, corner, j)) out[n++] = slots[static_cast<std::size_t>(j)];
-  if (n == 2) out[2] = out[0], out[3] = out[1];
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
-/// Corners that hang, by their masters.
-class HangingPoints {
+/// Cells of a patch in groups. Of each kind those first that make rows of eight, then pairs of rows
+/// of four, then the others by fold.
+class Grouping {
  public:
-  HangingPoints(std::size_t first, std::vector<std::array<std::uint16_t, 4>>& masters)
-      : first_(first), masters_(masters) {}
-
-  std::uint16_t operator()(const std::array<std::uint16_t, 4>& key) {
-    const std::uint64_t bits = std::uint64_t{key[0]} | std::uint64_t{key[1]} << 16 |
-                               std::uint64_t{key[2]} << 32 | std::uint64_t{key[3]} << 48;
-    const auto [entry, added] = known_.try_emplace(bits, size_of(masters_.size()));
-    if (added) masters_.push_back(key);
-    return static_cast<std::uint16_t>(first_ + static_cast<std::size_t>(entry->second));
+  Grouping(const Level& level, const std::vector<std::uint16_t>& kind_of, Draft& draft,
+           Numbering& numbering)
+      : level_(level), draft_(draft), cells_(draft.cells) {
+    std::sort(cells_.begin(), cells_.end(), [&](std::int32_t a, std::int32_t b) {
+      return std::tuple(kind_of[a], place_key(level.corner[a]), a) <
+             std::tuple(kind_of[b], place_key(level.corner[b]), b);
+    });
+    draft.cells = cells_;
+    numbering.number(draft, corners_, slots_);
+    nothing_ = static_cast<std::uint16_t>(draft.vertices.size() + draft.masters.size());
+    draft.cells.clear();
+    for (std::size_t begin = 0; begin < cells_.size();) {
+      std::size_t end = begin + 1;
+      while (end < cells_.size() && kind_of[cells_[end]] == kind_of[cells_[begin]]) ++end;
+      group_kind(begin, end, kind_of[cells_[begin]]);
+      begin = end;
+    }
+    put_slots();
   }
 
  private:
-  std::size_t first_;
-  std::vector<std::array<std::uint16_t, 4>>& masters_;
-  std::unordered_map<std::uint64_t, std::int32_t> known_;
-};
-
-/// Whether `next` lies beside `cell` along x, joined, and the vertices of both follow each other.
-bool continues(const Level& level, std::int32_t cell, std::int32_t next) {
-  const auto& a = level.slots[cell];
-  const auto& b = level.slots[next];
-  for (std::size_t i = 0; i < 8; i += 2)
-    if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
-  return true;
-}
-
-/// Order and groups of the cells of a patch: by kind, then by fold, then as the level has them; of
-/// each kind those first that make whole rows.
-void order_cells(const Level& level, const std::vector<std::uint16_t>& kind_of, Draft& draft) {
-  std::vector<std::int32_t> cells = std::move(draft.cells), rest;
-  const auto kind = [&](std::int32_t c) { return kind_of.empty() ? std::uint16_t{0} : kind_of[c]; };
-  const auto fold = [&](std::int32_t c) { return (level.fold[c] & 255) == 0 ? 0 : level.fold[c]; };
-  std::sort(cells.begin(), cells.end(), [&](std::int32_t a, std::int32_t b) {
-    return std::tuple(kind(a), fold(a), a) < std::tuple(kind(b), fold(b), b);
-  });
-  draft.cells.clear();
-  const auto put = [&](std::int32_t c, bool row) {
-    if (draft.cells.size() % kGroup == 0) {
-      draft.kind.push_back(kind(c));
-      draft.row.push_back(row);
-    }
-    draft.cells.push_back(c);
-  };
-  const auto put_rest = [&] {
-    for (const std::int32_t c : rest) put(c, false);
-    while (draft.cells.size() % kGroup != 0) draft.cells.push_back(-1);
-    rest.clear();
-  };
-  for (std::size_t i = 0; i < cells.size();) {
-    if (i > 0 && kind(cells[i]) != kind(cells[i - 1])) put_rest();
-    std::size_t run = 1;
-    while (run < kGroup && fold(cells[i]) == 0 && i + run < cells.size() &&
-           kind(cells[i + run]) == kind(cells[i]) && fold(cells[i + run]) == 0 &&
-           continues(level, cells[i + run - 1], cells[i + run]))
-      ++run;
-    const bool row = run == kGroup;
-    for (std::size_t k = i; k < i + run; ++k)
-      if (row)
-        put(cells[k], true);
-      else
-        rest.push_back(cells[k]);
-    i += run;
+  /// Whether the points of the next cell continue those of cell n along x.
+  bool continues(std::size_t n) const {
+    const Corners &a = corners_[n], &b = corners_[n + 1];
+    for (std::size_t i = 0; i < 8; i += 2)
+      if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
+    return true;
   }
-  put_rest();
-}
 
-/// Points of all corners of a patch, and of the slots where some corner hangs.
-void number_points(const Level& level, Numbering& point, Draft& draft) {
-  point.begin(level, draft.cells, draft.vertices);
-  HangingPoints hanging(draft.vertices.size(), draft.masters);
-  constexpr std::uint16_t kNothing = 0xFFFF;
-  draft.corners.assign(8 * draft.cells.size(), kNothing);
-  for (std::size_t g = 0; g < draft.cells.size() / kGroup; ++g) {
-    std::array<std::uint16_t, 64> slots;
-    slots.fill(kNothing);
-    bool folded = false;
-    for (std::size_t k = 0; k < kGroup; ++k) {
-      const std::int32_t c = draft.cells[kGroup * g + k];
-      if (c < 0) continue;
-      std::array<std::uint16_t, 8> of;
-      for (std::size_t i = 0; i < 8; ++i) slots[kGroup * i + k] = of[i] = point(level.slots[c][i]);
-      for (int i = 0; i < 8; ++i) {
-        const bool hangs = kernels::is_hanging(level.fold[c], i);
-        folded = folded || hangs;
-        draft.corners[8 * kGroup * g + kGroup * static_cast<std::size_t>(i) + k] =
-            hangs ? hanging(masters_of(of, kernels::fold_octant(level.fold[c]), i))
-                  : of[static_cast<std::size_t>(i)];
+  void group_kind(std::size_t begin, std::size_t end, std::uint16_t kind) {
+    std::vector<std::size_t> halves, rest;
+    for (std::size_t i = begin; i < end;) {
+      std::size_t run = 1;
+      while (run < kGroup && i + run < end && continues(i + run - 1)) ++run;
+      if (run == kGroup)
+        for (std::size_t k = 0; k < run; ++k) put(i + k, kind, kRow);
+      else
+        for (std::size_t k = 0; k < run; ++k)
+          (k < run / 4 * 4 ? halves : rest).push_back(i + k);
+      i += run;
+    }
+    if (halves.size() % kGroup != 0) {
+      rest.insert(rest.end(), halves.end() - 4, halves.end());
+      halves.erase(halves.end() - 4, halves.end());
+    }
+    for (const std::size_t n : halves) put(n, kind, kTwoRows);
+    const auto fold = [&](std::size_t n) { return level_.fold[cells_[n]]; };
+    std::stable_sort(rest.begin(), rest.end(),
+                     [&](std::size_t a, std::size_t b) { return fold(a) < fold(b); });
+    for (const std::size_t n : rest) put(n, kind, kScattered);
+    while (draft_.cells.size() % kGroup != 0) draft_.cells.push_back(-1);
+    index_.resize(draft_.cells.size());
+  }
+
+  void put(std::size_t n, std::uint16_t kind, RowKind row) {
+    const std::size_t k = draft_.cells.size() % kGroup, group = draft_.cells.size() / kGroup;
+    if (k == 0) {
+      draft_.kind.push_back(kind);
+      draft_.row.push_back(row);
+      draft_.folded.push_back(0);
+      draft_.corners.resize(draft_.corners.size() + 8 * kGroup, nothing_);
+    }
+    draft_.cells.push_back(cells_[n]);
+    index_.push_back(n);
+    for (std::size_t i = 0; i < 8; ++i)
+      draft_.corners[8 * kGroup * group + kGroup * i + k] = corners_[n][i];
+    if (!kernels::has_hanging(level_.fold[cells_[n]])) return;
+    draft_.folded[group] = 1;
+  }
+
+  /// Slots of the groups in which some corner hangs.
+  void put_slots() {
+    for (std::size_t g = 0; g < draft_.folded.size(); ++g) {
+      if (draft_.folded[g] == 0) continue;
+      const std::size_t at = draft_.slots.size();
+      draft_.slots.resize(at + 8 * kGroup, nothing_);
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        const std::int32_t c = draft_.cells[kGroup * g + k];
+        if (c < 0) continue;
+        const Corners& from = slots_[index_[kGroup * g + k]];
+        for (std::size_t i = 0; i < 8; ++i) draft_.slots[at + kGroup * i + k] = from[i];
       }
     }
-    draft.folded.push_back(folded);
-    if (folded) draft.slots.insert(draft.slots.end(), slots.begin(), slots.end());
   }
-  point.end(draft.vertices);
-  const std::size_t nothing = draft.vertices.size() + draft.masters.size();
-  ensures(nothing < kNothing, "a patch has too many points");
-  for (auto* numbers : {&draft.corners, &draft.slots})
-    for (std::uint16_t& p : *numbers)
-      if (p == kNothing) p = static_cast<std::uint16_t>(nothing);
-}
+
+  const Level& level_;
+  Draft& draft_;
+  std::vector<std::int32_t> cells_;  // in the order of corners_ and slots_
+  std::vector<Corners> corners_, slots_;
+  std::vector<std::size_t> index_;  // per lane, into these
+  std::uint16_t nothing_ = 0;
+};
 
 std::vector<std::uint16_t> number_kinds(const Hierarchy& hierarchy, PatchedLevel& out) {
   std::vector<std::uint16_t> kind_of(hierarchy.values.size());
@@ -213,6 +279,52 @@ std::vector<std::uint16_t> number_kinds(const Hierarchy& hierarchy, PatchedLevel
     kind_of[c] = static_cast<std::uint16_t>(k);
   }
   return kind_of;
+}
+
+void find_held(const PatchedLevel* finer, PatchedLevel& out) {
+  const Level& level = *out.level;
+  out.held.assign(level.corner.size(), 0);
+  for (std::int32_t c = 0; c < level.cells(); ++c)
+    if (finer == nullptr) {
+      for (const std::int32_t v : level.slots[c])
+        out.held[c] = static_cast<std::uint8_t>(out.held[c] | level.fixed[v]);
+    } else {
+      for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k)
+        out.held[c] = static_cast<std::uint8_t>(out.held[c] | finer->held[level.children[k]]);
+    }
+}
+
+std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const PatchedLevel& out) {
+  const Level& level = *out.level;
+  std::vector<std::uint16_t> kind_of(level.corner.size(), kMerged);
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    const std::int32_t child = level.children[level.child_begin[c]];
+    if (finer.level->place[child] == kernels::kPassed) kind_of[c] = kPassed;
+    unsigned octants = 0;  // without duplication two children can have one
+    bool twice = false;
+    for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k) {
+      const unsigned bit = 1U << (finer.level->place[level.children[k]] % 8);
+      twice = twice || (octants & bit) != 0;
+      octants |= bit;
+    }
+    if (out.held[c] != 0 || twice) kind_of[c] = kGeneral;
+  }
+  return kind_of;
+}
+
+void place_children(const PatchedLevel& finer, PatchedLevel& out) {
+  const Level& level = *out.level;
+  out.children.assign(8 * out.cell.size(), -1);
+  for (std::size_t lane = 0; lane < out.cell.size(); ++lane) {
+    const std::int32_t c = out.cell[lane];
+    if (c < 0) continue;
+    for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k) {
+      const std::int32_t child = level.children[k];
+      const std::size_t octant = finer.level->place[child] % 8;  // kPassed: 0
+      out.children[8 * kGroup * (lane / kGroup) + kGroup * octant + lane % kGroup] =
+          finer.lane[child];
+    }
+  }
 }
 
 /// Cells along a curve that stays within cubes, cut into patches.
@@ -247,7 +359,7 @@ void number_vertices(std::vector<Draft>& drafts, PatchedLevel& out) {
     for (std::size_t k = 0; k < vertices.size(); ++k) {
       if (owner[vertices[k]] != size_of(p)) continue;
       out.vertex.push_back(vertices[k]);
-      out.own_point.push_back(static_cast<std::uint16_t>(k));
+      out.own_point.push_back(drafts[p].vertex_point[k]);
     }
     fill_to_tile(out.vertex);
     out.own_point.resize(out.vertex.size(), nothing);
@@ -278,7 +390,7 @@ void number_copies(const std::vector<Draft>& drafts, PatchedLevel& out) {
     for (std::size_t k = 0; k < vertices.size(); ++k) {
       const std::int32_t packed = out.packed[vertices[k]];
       if (packed < out.first_shared) continue;
-      out.copy_point.push_back(static_cast<std::uint16_t>(k));
+      out.copy_point.push_back(drafts[p].vertex_point[k]);
       out.copy_vertex.push_back(packed);
       ++out.copies_begin[static_cast<std::size_t>(packed - out.first_shared) + 1];
     }
@@ -305,8 +417,7 @@ void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
     patch.groups = size_of(draft.cells.size() / kGroup);
     patch.first_hanging = size_of(out.hanging_masters.size());
     patch.hanging = size_of(draft.masters.size());
-    patch.hanging_point = size_of(draft.vertices.size());
-    patch.points = patch.hanging_point + patch.hanging + 1;
+    patch.points = size_of(draft.vertices.size()) + patch.hanging + 1;
     std::int32_t at = size_of(out.slots.size() / (8 * kGroup));
     for (const std::uint8_t folded : draft.folded) out.slots_at.push_back(folded ? at++ : -1);
     append(out.cell, draft.cells);
@@ -315,6 +426,7 @@ void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
     append(out.row, draft.row);
     append(out.folded, draft.folded);
     append(out.kind, draft.kind);
+    append(out.hanging_point, draft.hanging_point);
     append(out.hanging_masters, draft.masters);
   }
   out.lane.assign(out.level->corner.size(), -1);
@@ -368,38 +480,33 @@ std::size_t PatchedLevel::bytes() const {
          bytes_of(corners) + bytes_of(kind) + bytes_of(row) + bytes_of(folded) + bytes_of(slots_at) +
          bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
          bytes_of(own_point) + bytes_of(copy_point) + bytes_of(copy_vertex) +
-         bytes_of(hanging_masters) + bytes_of(copies_begin) + bytes_of(copies_of) +
+         bytes_of(hanging_point) + bytes_of(hanging_masters) + bytes_of(copies_begin) + bytes_of(copies_of) +
          bytes_of(prolong.begin) + bytes_of(prolong.vertex) + bytes_of(prolong.weight) +
          bytes_of(restrict_.begin) + bytes_of(restrict_.vertex) + bytes_of(restrict_.weight) +
-         bytes_of(has_fixed);
+         bytes_of(held) + bytes_of(children);
 }
 
-PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, int threads) {
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index,
+                          const PatchedLevel* finer, int threads) {
   PatchedLevel out;
   out.level = &hierarchy.levels[index];
   const Level& level = *out.level;
-  std::vector<std::uint16_t> kind_of;
-  if (index == 0) kind_of = number_kinds(hierarchy, out);
+  find_held(finer, out);
+  const std::vector<std::uint16_t> kind_of =
+      finer == nullptr ? number_kinds(hierarchy, out) : stored_kinds(*finer, out);
   std::vector<Draft> drafts = divide(level);
   out.patches.resize(drafts.size());
   const auto count = size_of(drafts.size());
 #pragma omp parallel num_threads(threads) if (count > 1)
   {
-    Numbering point(level.point.size());
+    Numbering numbering(level);
 #pragma omp for schedule(dynamic, 1)
-    for (std::int32_t p = 0; p < count; ++p) {
-      order_cells(level, kind_of, drafts[p]);
-      number_points(level, point, drafts[p]);
-    }
+    for (std::int32_t p = 0; p < count; ++p) Grouping(level, kind_of, drafts[p], numbering);
   }
   number_vertices(drafts, out);
   number_copies(drafts, out);
   join(drafts, out);
-  if (index > 0) return out;
-  out.has_fixed.assign(level.corner.size(), 0);
-  for (std::int32_t c = 0; c < level.cells(); ++c)
-    for (const std::int32_t v : level.slots[c])
-      out.has_fixed[c] = static_cast<std::uint8_t>(out.has_fixed[c] | level.fixed[v]);
+  if (finer != nullptr) place_children(*finer, out);
   return out;
 }
 

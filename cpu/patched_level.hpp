@@ -13,9 +13,6 @@
 // Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
 //           nothing for corners. The cells of a group are of one kind.
 //
-//             corners   [group][corner][lane]    point
-//             matrices  [group][entry][lane]     levels above 0
-//
 // Cuts and hanging corners need nothing beyond the numbers of points.
 #pragma once
 
@@ -39,6 +36,20 @@ struct SparseWeights {
   std::vector<float> weight;         // multiples of 1/64: exact
 };
 
+/// How the matrix of a cell of a stored level comes about; cells of a group are alike.
+enum StoredKind : std::uint16_t {
+  kMerged,  ///< from children without held components, one an octant
+  kPassed,  ///< from one cell of the same place and size, without held components
+  kGeneral  ///< some cell of level 0 below has a held component, or two children have one octant
+};
+
+/// How the points of a group lie.
+enum RowKind : std::uint8_t {
+  kScattered,
+  kTwoRows,  ///< each half of the group is a row: cells side by side along x, points in order
+  kRow       ///< the whole group is one
+};
+
 /// What cells of level 0 have in common.
 struct CellKind {
   double stiffness = 0, mass = 0, side = 0;  // E side, density side^3, m
@@ -51,8 +62,7 @@ struct Patch {
   std::int32_t first_group = 0, groups = 0;
   std::int32_t first_own = 0, own = 0;          // packed vertices: multiples of eight
   std::int32_t first_copy = 0, copies = 0;      // points that are shared vertices
-  std::int32_t first_hanging = 0, hanging = 0;  // into hanging_masters
-  std::int32_t hanging_point = 0;               // the first; the others follow
+  std::int32_t first_hanging = 0, hanging = 0;  // into hanging_point
   std::int32_t points = 0;
 };
 
@@ -64,8 +74,8 @@ struct PatchedLevel {
   std::vector<std::int32_t> cell;      // per lane, -1: none
   std::vector<std::int32_t> lane;      // per cell
   std::vector<std::uint16_t> corners;  // [group][8][8]: points
-  std::vector<std::uint16_t> kind;     // per group, level 0
-  std::vector<std::uint8_t> row;       // per group: cells side by side along x, points in order
+  std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
+  std::vector<std::uint8_t> row;       // per group: RowKind
   std::vector<std::uint8_t> folded;    // per group: some corner hangs, so that slots differ
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie
   std::vector<std::uint16_t> slots;    // [folded group][8][8]: points
@@ -76,6 +86,7 @@ struct PatchedLevel {
   std::vector<std::uint16_t> own_point;  // per packed vertex that is not shared
   std::vector<std::uint16_t> copy_point;
   std::vector<std::int32_t> copy_vertex;  // packed
+  std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> hanging_masters;
   std::int32_t first_shared = 0;                // packed
   std::vector<std::int32_t> copies_begin;       // per shared packed vertex + 1
@@ -83,7 +94,9 @@ struct PatchedLevel {
 
   SparseWeights prolong;                // rows: packed vertices; columns: of the next level
   SparseWeights restrict_;              // rows: packed vertices of the next level
-  std::vector<std::uint8_t> has_fixed;  // per cell of level 0
+  std::vector<std::uint8_t> held;       // per cell: it, or some cell below, has a held component
+  std::vector<std::int32_t> children;   // [group][octant][8], above level 0: lanes of the level
+                                        // before, -1: none; one that passed at octant 0
 
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
@@ -97,8 +110,9 @@ inline std::size_t scalar_of(std::int32_t packed) {
   return kTileScalars * (v / kGroup) + v % kGroup;
 }
 
-/// All but the weights between levels.
-PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, int threads);
+/// All but the weights between levels. `finer` is the level before, null for level 0.
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index,
+                          const PatchedLevel* finer, int threads);
 
 /// The weights from `fine` to the next level.
 void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine);

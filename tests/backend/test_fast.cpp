@@ -24,6 +24,9 @@ using test::ProblemOptions;
 constexpr OperatorScale kDynamic{0.8, 400};
 // Some ten roundings of single precision, of sums whose terms are as large as the largest entry.
 constexpr double kSingle = 2e-6;
+// Matrices of level 1 are integers of 16 bits, and those above are made from them.
+constexpr double kCoded = 5e-5;
+constexpr double kCodedSmoothed = 2e-2;
 // Diagonal blocks are inverted; those of lone corners are ill-conditioned by a factor of tens.
 constexpr double kSmoothed = 1e-4;
 
@@ -55,7 +58,7 @@ TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
       loaded->backend->apply(l, kKrylovX, kKrylovV);
     }
     EXPECT_LE(relative(p.read(*mixed.backend, l, kKrylovV), p.read(*exact.backend, l, kKrylovV)),
-              kSingle);
+              l == 0 ? kSingle : kCoded);
     if (l + 1 == p.levels()) continue;
     for (const Loaded* loaded : {&exact, &mixed}) {
       test::write(*loaded->backend, l, kRight, f);
@@ -65,10 +68,10 @@ TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
       loaded->backend->restrict_residual(l);
     }
     EXPECT_LE(relative(p.read(*mixed.backend, l, kSolution), p.read(*exact.backend, l, kSolution)),
-              kSmoothed);
+              l == 0 ? kSmoothed : kCodedSmoothed);
     EXPECT_LE(
         relative(p.read(*mixed.backend, l + 1, kRight), p.read(*exact.backend, l + 1, kRight)),
-        kSmoothed);
+        l == 0 ? kSmoothed : kCodedSmoothed);
   }
 }
 

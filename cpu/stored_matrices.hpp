@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+//
+// The cell matrices of a stored level in the basis of modes (kernels/mode_coarsen.hpp), eight cells
+// side by side.
+//
+// Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
+// Codes   Level 1 holds an eighth of the cells and most of the bytes of all stored levels. In single
+//         precision its entries are 16-bit integers, multiples of one number a cell: the greatest
+//         entry over 32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not
+//         notice. Held cells are not coded: what supports leave of some coarse matrices is singular,
+//         and must not turn indefinite.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "cpu/patched_level.hpp"
+#include "kernels/mode_coarsen.hpp"
+
+namespace kerf::cpu {
+
+/// Eight integers as scalars.
+inline Pack<float> widened(const std::int16_t* from) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
+  return Pack<float>::Vector(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(codes)));
+#else
+  Pack<float> out;
+  for (int k = 0; k < 8; ++k) out.set(k, static_cast<float>(from[k]));
+  return out;
+#endif
+}
+
+/// The nearest integers, even ones in the middle.
+inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const __m256i codes = _mm256_cvtps_epi32(__m256(x.v));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
+                   _mm_packs_epi32(_mm256_castsi256_si128(codes),
+                                   _mm256_extracti128_si256(codes, 1)));
+#else
+  for (int k = 0; k < 8; ++k) to[k] = static_cast<std::int16_t>(std::lrint(x[k]));
+#endif
+}
+
+template <class S>
+struct PlainEntries {
+  const S* from;
+  Pack<S> operator[](int entry) const { return load_pack(from + kGroup * entry); }
+};
+struct CodedEntries {
+  const std::int16_t* from;
+  Pack<float> operator[](int entry) const { return widened(from + kGroup * entry); }
+};
+
+template <class S>
+class StoredMatrices {
+ public:
+  using P = Pack<S>;
+
+  /// Room for the groups of a level.
+  void allocate(const PatchedLevel& level, bool coded, bool with_mass) {
+    begin_.clear();
+    traits_.clear();
+    std::size_t plain = 0, codes = 0;
+    for (std::size_t g = 0; g < level.groups(); ++g) {
+      const bool general = level.kind[g] == kGeneral;
+      const bool is_coded = coded && std::is_same_v<S, float> && !general;
+      const bool full = with_mass || general;
+      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0)));
+      std::size_t& size = is_coded ? codes : plain;
+      begin_.push_back(static_cast<std::uint32_t>(size));
+      size += full ? kernels::kEntries : kernels::kModeEntries;
+    }
+    plain_.resize(kGroup * plain);
+    codes_.resize(kGroup * codes);
+    unit_.resize(codes > 0 ? level.cell.size() : 0);
+  }
+
+  bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
+  std::size_t bytes() const {
+    return begin_.capacity() * sizeof(begin_[0]) + traits_.capacity() + plain_.capacity() * sizeof(S) +
+           codes_.capacity() * sizeof(codes_[0]) + unit_.capacity() * sizeof(S);
+  }
+
+  /// Of the lanes from `first` on.
+  void store(std::size_t group, int first, const P (&entries)[kernels::kEntries]) {
+    const int count = with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
+    if (!is_coded(group)) {
+      S* to = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
+      for (int e = 0; e < count; ++e) store_pack(to + kGroup * e, entries[e]);
+      return;
+    }
+    if constexpr (std::is_same_v<S, float>) encode(group, count, entries);
+  }
+
+  /// body(entries, unit, translations): matrices are the entries times the unit; the last says in
+  /// its type whether there are rows of translations.
+  template <class Body>
+  void read(std::size_t group, int first, const Body& body) const {
+    const auto with = [&](const auto& entries, const P& unit) {
+      if (with_translations(group))
+        body(entries, unit, std::true_type{});
+      else
+        body(entries, unit, std::false_type{});
+    };
+    const std::size_t at = kGroup * std::size_t{begin_[group]};
+    if constexpr (std::is_same_v<S, float>)
+      if (is_coded(group))
+        return with(CodedEntries{codes_.data() + at}, load_pack(unit_.data() + kGroup * group));
+    with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
+  }
+
+  /// The entries of single cells, one a lane (-1: none), and zero in rows of translations that are
+  /// not stored.
+  void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
+    for (P& entry : out) entry = P{};
+    for (int k = 0; k < P::kLanes; ++k) {
+      if (lanes[k] < 0) continue;
+      const auto lane = static_cast<std::size_t>(lanes[k]);
+      const std::size_t group = lane / kGroup;
+      const int count = with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
+      const std::size_t at = kGroup * std::size_t{begin_[group]} + lane % kGroup;
+      if (is_coded(group)) {
+        const S unit = unit_[lane];
+        const std::int16_t* from = codes_.data() + at;
+        for (int e = 0; e < count; ++e)
+          out[e].set(k, unit * static_cast<S>(from[kGroup * static_cast<std::size_t>(e)]));
+      } else {
+        const S* from = plain_.data() + at;
+        for (int e = 0; e < count; ++e)
+          out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::uint8_t kFull = 1, kCoded = 2;
+  bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
+
+  void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
+    P greatest{};
+    for (int e = 0; e < count; ++e) {
+      greatest = select(greatest < entries[e], entries[e], greatest);
+      greatest = select(greatest < -entries[e], -entries[e], greatest);
+    }
+    const P none = P(S(1e-30));
+    const P unit = select(greatest > none, greatest, none) * P(S(1) / S(32767));
+    const P inverse = P(S(1)) / unit;
+    store_pack(unit_.data() + kGroup * group, unit);
+    std::int16_t* to = codes_.data() + kGroup * std::size_t{begin_[group]};
+    for (int e = 0; e < count; ++e) store_narrowed(to + kGroup * e, entries[e] * inverse);
+  }
+
+  std::vector<std::uint32_t> begin_;  // per group: entries before it, in its array
+  std::vector<std::uint8_t> traits_;  // per group
+  std::vector<S> plain_;
+  std::vector<std::int16_t> codes_;
+  std::vector<S> unit_;  // per lane
+};
+
+}  // namespace kerf::cpu
