@@ -65,6 +65,7 @@ class Backend {
 
   // Values.
   virtual void set_operator(const OperatorScale& scale) = 0;
+  virtual OperatorScale operator_scale() const noexcept = 0;
   /// Level 0: R of every cell from the displacements, warm-started from the last R.
   virtual void rotate_cells(int displacement) = 0;
   /// R of every cell of level 0 as a unit quaternion, four doubles a cell: w x y z.

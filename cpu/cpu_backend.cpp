@@ -47,6 +47,7 @@ class CpuBackend final : public Backend {
   void set_smoother(const SmootherOptions& options) override { smoother_ = options; }
   int add_vector() override;
 
+  OperatorScale operator_scale() const noexcept override { return finest_.scale; }
   void set_operator(const OperatorScale& scale) override;
   void rotate_cells(int displacement) override;
   void read_rotations(std::span<double> out) const override;

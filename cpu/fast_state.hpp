@@ -98,6 +98,7 @@ class FastBackend final : public Backend {
   int add_vector() override;
 
   void set_operator(const OperatorScale& scale) override;
+  OperatorScale operator_scale() const noexcept override { return scale_; }
   void rotate_cells(int displacement) override;
   void read_rotations(std::span<double> out) const override;
   void write_rotations(std::span<const double> in) override;

@@ -26,6 +26,7 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
 void LinearSolver::set_structure(const Hierarchy& hierarchy) {
   const AddTime time(times_.structure);
   hierarchy_ = &hierarchy;
+  factor_due_ = true;
   cycle_type_ = setup_.cycle;
   // Measured (docs/convergence.md): on cut bodies the coarse cells are too stiff in bending, and
   // K-cycles repair it; on uncut ones V costs less.
@@ -57,12 +58,41 @@ void LinearSolver::refresh() {
   }
   backend_.prepare(0);
   if (setup_.method == SolverMethod::cg_jacobi) return;
-  const int levels = static_cast<int>(hierarchy_->levels.size());
-  for (int level = 0; level + 1 < levels; ++level) {
+  const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
+  const bool factors = factor_is_due();
+  for (int level = 0; level < last; ++level) {
+    if (level + 1 == last && !factors) break;  // its matrices serve the factor alone
     backend_.coarsen(level);
-    backend_.prepare(level + 1);
+    if (level + 1 < last) backend_.prepare(level + 1);
   }
+  if (!factors) return;
   backend_.factor_coarsest();
+  ++times_.factors;
+  factor_due_ = false;
+  factor_scale_ = backend_.operator_scale();
+  decades_with_new_ = 0;
+}
+
+bool LinearSolver::factor_is_due() const {
+  constexpr double kAlike = 0.05;
+  const OperatorScale now = backend_.operator_scale();
+  const auto differs = [](double a, double b) { return std::abs(a - b) > kAlike * std::abs(b); };
+  return factor_due_ || differs(now.stiffness, factor_scale_.stiffness) ||
+         differs(now.mass, factor_scale_.mass);
+}
+
+// With a factor of older rotations the coarsest correction is off, and cycles contract less.
+void LinearSolver::watch_factor(const SolveStats& stats, double before) {
+  constexpr double kWorthIt = 0.85;  // a factor costs as much as some cycles
+  if (stats.cycles == 0 || !(stats.residual > 0) || !(before > stats.residual)) {
+    factor_due_ = factor_due_ || !stats.converged;
+    return;
+  }
+  const double decades = std::log10(before / stats.residual) / stats.cycles;
+  if (decades_with_new_ == 0)
+    decades_with_new_ = decades;
+  else if (decades < kWorthIt * decades_with_new_ || !stats.converged)
+    factor_due_ = true;
 }
 
 double LinearSolver::true_residual(int b, int x) {
@@ -114,6 +144,7 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
   constexpr int kRestarts = 3;  // when the recursion and the true residual part
   SolveStats stats;
   double norm = true_residual(b, x);
+  const double before = norm / reference;
   for (int start = 0; start < kRestarts && stats.cycles < limit; ++start) {
     if (!fixed && norm <= goal) break;
     double rho = 0, alpha = 0;
@@ -140,6 +171,7 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
   }
   stats.residual = norm / reference;
   stats.converged = fixed || norm <= goal * (1 + 1e-12);
+  if (!jacobi) watch_factor(stats, before);
   return stats;
 }
 
@@ -148,6 +180,7 @@ SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) 
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
   double norm = true_residual(b, x);
+  const double before = norm / reference;
   while (stats.cycles < limit && (fixed || norm > goal)) {
     precondition(false);
     backend_.add(0, 1, kSolution, x);
@@ -157,6 +190,7 @@ SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) 
   }
   stats.residual = norm / reference;
   stats.converged = fixed || norm <= goal;
+  watch_factor(stats, before);
   return stats;
 }
 

@@ -24,6 +24,7 @@ struct SolveStats {
 struct SolverTimes {
   double structure = 0;  ///< symbolic work: after a cut
   double values = 0;     ///< coarse matrices, diagonal blocks, factors: every update
+  int factors = 0;       ///< how often the coarsest level was factored
   double solve = 0;
 };
 
@@ -35,7 +36,9 @@ class LinearSolver {
 
   /// After load(): symbolic work, choice of the cycle.
   void set_structure(const Hierarchy& hierarchy);
-  /// After set_operator() and rotate_cells(): all values that the method needs.
+  /// After set_operator() and rotate_cells(): all values that the method needs. The factor of the
+  /// coarsest level is kept from the last time while cycles contract as they did with a new one: the
+  /// preconditioner is then of slightly older rotations, the solution is not.
   void refresh();
   /// Improves x until |b - A x| <= tolerance * reference, or by a fixed number of cycles.
   /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
@@ -53,6 +56,9 @@ class LinearSolver {
   double true_residual(int b, int x);  // leaves b - A x in kRight
   void precondition(bool jacobi);
 
+  bool factor_is_due() const;
+  void watch_factor(const SolveStats& stats, double before);
+
   Backend& backend_;
   SolverSetup setup_;
   const Hierarchy* hierarchy_ = nullptr;
@@ -62,6 +68,9 @@ class LinearSolver {
   std::unique_ptr<SparseCholesky> cholesky_;
   int residual_ = -1;                  // the true one, or the recursion of conjugate gradients
   int direction_ = -1, product_ = -1;  // of conjugate gradients
+  bool factor_due_ = true;
+  OperatorScale factor_scale_;     // of the operator that was factored
+  double decades_with_new_ = 0;    // a cycle, of the first solve after it
   SolverTimes times_;
   Progress progress_;
 };
