@@ -284,7 +284,8 @@ void FastBackend<S>::coarsen(int fine) {
   const FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
   const PatchedLevel& packed = to.patched;
-  to.matrices.allocate(packed, fine == 0, scale_.mass != 0);
+  const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
+  to.matrices.allocate(packed, !coarsest, scale_.mass != 0);
   parallel(static_cast<std::int32_t>(packed.groups()), kWorthGroups, [&](std::int32_t g) {
     const auto group = static_cast<std::size_t>(g);
     const bool passed = packed.kind[group] == kPassed;

@@ -150,6 +150,7 @@ class FastBackend final : public Backend {
   }
   static constexpr std::int32_t kWorthGroups = 8;  // whose matrices are made
   static constexpr std::int32_t kWorthTiles = 512;
+  static constexpr std::size_t kWorthCells = 4096;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 
   void allocate(FastVector& vector, const PatchedLevel& level, bool exact) const;
@@ -230,7 +231,7 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Own& own, cons
   const std::int32_t first_shared = l.first_shared / kGroup, tiles = levels_[level].tiles();
   T* const partial = partial_sums<T>(4 * l.copy_point.size());
   std::vector<Sums> sums(l.patches.size() + static_cast<std::size_t>(tiles - first_shared));
-#pragma omp parallel num_threads(threads_) if (patches > 1)
+#pragma omp parallel num_threads(threads_) if (l.cell.size() >= kWorthCells)
   {
 #pragma omp for schedule(static)
     for (std::int32_t t = first_shared; t < tiles; ++t) before(static_cast<std::size_t>(t));

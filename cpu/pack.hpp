@@ -183,7 +183,8 @@ kernels::Vec3<Pack<S>> gathered(const S* x, const std::uint16_t* at) {
 
 /// Calls body(lane, record) for the vectors of the lanes, as records, in the order of the lanes.
 template <class Body>
-void for_records(const kernels::Vec3<Pack<float>>& f, const Body& body) {
+[[gnu::always_inline]] inline void for_records(const kernels::Vec3<Pack<float>>& f,
+                                               const Body& body) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256 x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_ps();
   const __m256 xy_low = _mm256_unpacklo_ps(x, y), xy_high = _mm256_unpackhi_ps(x, y);
@@ -199,7 +200,8 @@ void for_records(const kernels::Vec3<Pack<float>>& f, const Body& body) {
 #endif
 }
 template <class Body>
-void for_records(const kernels::Vec3<Pack<double>>& f, const Body& body) {
+[[gnu::always_inline]] inline void for_records(const kernels::Vec3<Pack<double>>& f,
+                                               const Body& body) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256d x(f.x.v), y(f.y.v), z(f.z.v), zero = _mm256_setzero_pd();
   const __m256d xy_low = _mm256_unpacklo_pd(x, y), xy_high = _mm256_unpackhi_pd(x, y);
@@ -383,7 +385,8 @@ inline void add_to_row(double* first, const kernels::Vec3<Pack<double>>& left,
 }
 
 template <class S>
-void put_points(S* x, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& v) {
+[[gnu::always_inline]] inline void put_points(S* x, const std::uint16_t* at,
+                                              const kernels::Vec3<Pack<S>>& v) {
   for_records(v, [&](int lane, typename Record<S>::Vector record) {
     __builtin_memcpy(x + 4 * std::size_t(at[lane]), &record, sizeof record);
   });
@@ -391,7 +394,8 @@ void put_points(S* x, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& v) 
 
 /// In the order of the lanes, which may meet in a point.
 template <class S>
-void add_to_points(S* x, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& v) {
+[[gnu::always_inline]] inline void add_to_points(S* x, const std::uint16_t* at,
+                                                 const kernels::Vec3<Pack<S>>& v) {
   for_records(v, [&](int lane, typename Record<S>::Vector record) {
     S* to = x + 4 * std::size_t(at[lane]);
     typename Record<S>::Vector sum;

@@ -38,7 +38,7 @@ std::uint64_t morton(const Vec3i& c) {
 
 /// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kMost = 4096, kLeast = 256, kPatches = 32;
+  constexpr std::int32_t kMost = 4096, kLeast = 256, kPatches = 16;
   std::int32_t size = kMost;
   while (size > kLeast && cells < kPatches * size) size /= 2;
   return size;

@@ -4,10 +4,10 @@
 // side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
-// Codes   Level 1 holds an eighth of the cells and most of the bytes of all stored levels. In single
-//         precision its entries are 16-bit integers, multiples of one number a cell: the greatest
-//         entry over 32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not
-//         notice. Held cells are not coded: what supports leave of some coarse matrices is singular,
+// Codes   Products with stored matrices cost the bytes of their entries. In single precision these
+//         are 16-bit integers, multiples of one number a cell: the greatest entry over 32767. So they
+//         are off by at most 1.5e-5 of it, which a preconditioner does not notice. Held cells are not
+//         coded, nor is the coarsest level: what supports leave of some coarse matrices is singular,
 //         and must not turn indefinite.
 #pragma once
 
