@@ -127,7 +127,6 @@ std::uint64_t hash_of(const Hierarchy& hierarchy) {
     hash.add(level.slots);
     hash.add(level.fixed);
     hash.add(level.incidence);
-    hash.add(level.colour_order);
   }
   return hash.value();
 }

@@ -156,7 +156,7 @@ void Simulation::Impl::build_structure() {
   hierarchy.cut = links_cut > 0;
   hierarchy.poisson = {setup.material.poisson};
   for (const Region& region : setup.regions) hierarchy.poisson.push_back(region.material.poisson);
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const std::vector<std::int32_t>& leaves = body.leaves();
   hierarchy.values.resize(leaves.size());
   for (std::size_t c = 0; c < leaves.size(); ++c) {
     const std::uint8_t index = body.nodes()[leaves[c]].material;
@@ -298,7 +298,7 @@ void Simulation::Impl::transfer(const Level& before, const std::vector<std::int3
   std::vector<std::int32_t> cell_of(body.nodes().size(), -1);
   for (std::size_t c = 0; c < leaves_before.size(); ++c)
     cell_of[leaves_before[c]] = static_cast<std::int32_t>(c);
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const std::vector<std::int32_t>& leaves = body.leaves();
   std::vector<std::int32_t> origin(leaves.size());
   std::vector<double> turned(4 * leaves.size());
   for (std::size_t c = 0; c < leaves.size(); ++c) {

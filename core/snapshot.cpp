@@ -43,7 +43,7 @@ Vec3d at(std::span<const double> x, std::int32_t vertex) {
 }
 
 void add_boundary(const LinkedOctree& body, Snapshot& out) {
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const std::vector<std::int32_t>& leaves = body.leaves();
   for (std::size_t c = 0; c < leaves.size(); ++c) {
     const LinkedOctree::Node& leaf = body.nodes()[leaves[c]];
     if (leaf.size_log2 != 0) continue;  // larger leaves are linked on all sides

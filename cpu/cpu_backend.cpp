@@ -147,6 +147,7 @@ void CpuBackend::load(const Hierarchy& hierarchy) {
     store.tile_log2 = tile_log2_;
     store.bound = 0;
     store.solution_is_zero = false;
+    store.colours = {};
     store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (auto& vector : store.vectors)
       vector.assign(3 * static_cast<std::size_t>(store.vertices()), 0.0);
@@ -206,8 +207,7 @@ void CpuBackend::coarsen(int fine) {
   LevelStore& to = levels_[fine + 1];
   parallel(to.cells(), [&](std::int32_t cell) {
     double sum[kEntries] = {};
-    for (std::int32_t k = to.level->child_begin[cell]; k < to.level->child_begin[cell + 1]; ++k) {
-      const std::int32_t child = to.level->children[k];
+    for (const std::int32_t child : to.level->children_of(cell)) {
       double packed[kEntries];
       cpu::cell_matrix(from, child, packed);
       if (from.level->place[child] == Level::kPassed) {
@@ -230,8 +230,8 @@ void CpuBackend::prepare(int level) {
   const Level& l = *store.level;
   parallel(store.vertices(), [&](std::int32_t v) {
     Sym sum{};
-    for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-      sum += cpu::diagonal_block(store, l.incidence[k] / 8, l.incidence[k] % 8);
+    for (const std::int32_t k : l.incidences_of(v))
+      sum += cpu::diagonal_block(store, k / 8, k % 8);
     const std::uint8_t fixed = l.fixed[v];
     if (fixed & 1) sum.xx = sum.xy = sum.xz = 0;
     if (fixed & 2) sum.yy = sum.xy = sum.yz = 0;
@@ -275,8 +275,7 @@ void CpuBackend::cells_to_vertices(LevelStore& store, double* out, bool masks,
       store.vertices(),
       [&](std::int32_t v) {
         Vec sum{};
-        for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-          sum += store.products[l.incidence[k]];
+        for (const std::int32_t k : l.incidences_of(v)) sum += store.products[k];
         cpu::store(out, v, masks ? masked(sum, l.fixed[v]) : sum);
       },
       kWorthVertices);
@@ -351,14 +350,16 @@ void CpuBackend::gauss_seidel(LevelStore& store, int level, SweepOrder order) {
   const Level& l = *store.level;
   double* u = changed(level, kSolution);
   const double* f = store.vectors[kRight].data();
-  for (int step = 0; step < l.colours(); ++step) {
-    const int colour = order == SweepOrder::forward ? step : l.colours() - 1 - step;
-    const std::int32_t begin = l.colour_begin[colour];
-    parallel(l.colour_begin[colour + 1] - begin, [&](std::int32_t i) {
-      const std::int32_t v = l.colour_order[begin + i];
+  if (store.colours.order.empty()) store.colours = colour_vertices(l);
+  const Colours& colours = store.colours;
+  for (int step = 0; step < colours.count(); ++step) {
+    const int colour = order == SweepOrder::forward ? step : colours.count() - 1 - step;
+    const std::int32_t begin = colours.begin[colour];
+    parallel(colours.begin[colour + 1] - begin, [&](std::int32_t i) {
+      const std::int32_t v = colours.order[begin + i];
       Vec r = cpu::load(f, v);
-      for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-        r -= cpu::cell_row(store, l.incidence[k] / 8, l.incidence[k] % 8, u);
+      for (const std::int32_t k : l.incidences_of(v))
+        r -= cpu::cell_row(store, k / 8, k % 8, u);
       const Vec at = cpu::load(u, v);
       cpu::store(u, v, kernels::relax_vertex(at, r, store.inverse_diagonal[v], smoother_.omega));
     });
@@ -402,13 +403,12 @@ void CpuBackend::restrict_residual(int fine) {
   const double* r = data(fine, kResidual);
   parallel(to.cells(), [&](std::int32_t cell) {
     Vec sum[8];
-    for (std::int32_t k = c.child_begin[cell]; k < c.child_begin[cell + 1]; ++k) {
-      const std::int32_t child = c.children[k];
+    for (const std::int32_t child : c.children_of(cell)) {
       double w[8][8];
       kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);
       for (int i = 0; i < 8; ++i) {
         const std::int32_t v = f.slots[child][i];
-        if (f.incidence[f.incidence_begin[v]] != 8 * child + i) continue;
+        if (f.incidences_of(v)[0] != 8 * child + i) continue;
         const Vec at = cpu::load(r, v);
         for (int m = 0; m < 8; ++m)
           if (w[i][m] != 0) sum[m] += w[i][m] * at;
@@ -421,8 +421,7 @@ void CpuBackend::restrict_residual(int fine) {
       to.vertices(),
       [&](std::int32_t v) {
         Vec sum{};
-        for (std::int32_t k = c.incidence_begin[v]; k < c.incidence_begin[v + 1]; ++k)
-          sum += to.products[c.incidence[k]];
+        for (const std::int32_t k : c.incidences_of(v)) sum += to.products[k];
         cpu::store(out, v, masked(sum, c.fixed[v]));
       },
       kWorthVertices);
@@ -436,7 +435,7 @@ void CpuBackend::prolong_correction(int fine) {
   parallel(
       f.vertices(),
       [&](std::int32_t v) {
-        const std::int32_t first = f.incidence[f.incidence_begin[v]];
+        const std::int32_t first = f.incidences_of(v)[0];
         const std::int32_t child = first / 8, cell = f.parent[child];
         double w[8][8];
         kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);

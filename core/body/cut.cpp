@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/base/error.hpp"
 #include "core/body/cell_map.hpp"
@@ -93,10 +94,10 @@ Box3 quantiser_box(const Box3& body, const Box3& blade) {
 /// Finds the links that a blade crosses.
 class LinkSearch {
  public:
-  LinkSearch(const LinkedOctree& body, std::span<const Vec3d> corners, const Box3& body_box,
-             const Box3& blade_box)
+  /// `corners` holds eight for each leaf of `numbers`, or none in the reference state.
+  LinkSearch(const LinkedOctree& body, std::span<const std::int32_t> numbers,
+             std::span<const Vec3d> corners, const Box3& body_box, const Box3& blade_box)
       : body_(body),
-        corners_(corners),
         quantiser_(quantiser_box(body_box, blade_box)),
         // Small query boxes along a slanted triangle, but not too many if the body has grown.
         reach_(std::max(4 * body.lattice().spacing, largest(body_box.extent()) / 256)),
@@ -104,7 +105,7 @@ class LinkSearch {
                 32 * std::numeric_limits<double>::epsilon() *
                     std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box.lo),
                               largest(blade_box.hi)})),
-        near_(leaves_near(blade_box)),
+        near_(leaves_near(numbers, corners, blade_box)),
         tree_(boxes_),
         tested_(near_.size(), -1) {}
 
@@ -131,14 +132,15 @@ class LinkSearch {
 
  private:
   /// The leaves whose boxes the blade's box meets; their boxes go to boxes_.
-  std::vector<CellMap> leaves_near(Box3 blade_box) {
+  std::vector<CellMap> leaves_near(std::span<const std::int32_t> numbers,
+                                   std::span<const Vec3d> corners, Box3 blade_box) {
     inflate(blade_box, margin_);
-    const std::vector<std::int32_t> leaves = body_.leaves();
     std::vector<CellMap> near;
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves[i])];
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(numbers[i])];
+      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
       const CellMap cell{&body_.lattice(), node.corner, 1 << node.size_log2,
-                         corners_.empty() ? nullptr : corners_.data() + 8 * i};
+                         corners.empty() ? nullptr : corners.data() + 8 * i};
       Box3 box = box_of(cell, {0, 0, 0}, cell.side);
       // Parts of links that were cut may reach beyond the cell.
       for (int face = 0; node.size_log2 == 0 && face < 6; ++face)
@@ -250,7 +252,6 @@ class LinkSearch {
   }
 
   const LinkedOctree& body_;
-  std::span<const Vec3d> corners_;
   Quantiser quantiser_;
   double reach_;                     // of the parts of a triangle that are searched at a time, m
   double margin_;                    // covers the rounding of every box, m
@@ -287,6 +288,26 @@ Box3 bounds_of(const TriangleMesh& blade) {
   return box;
 }
 
+/// The leaves near the blade in the reference state, ascending.
+std::vector<std::int32_t> leaves_at_rest(const LinkedOctree& body, const Box3& blade) {
+  const Lattice& lattice = body.lattice();
+  Vec3i low, high;
+  for (int d = 0; d < 3; ++d) {
+    const auto k = static_cast<std::size_t>(d);
+    // One cell more for links that reach beyond theirs, and one for rounding.
+    const auto cell = [&](double x, int more) {
+      const double at = std::floor((x - lattice.origin[d]) / lattice.spacing) + more;
+      return static_cast<std::int32_t>(std::clamp(at, -1.0, 1.0 * lattice.size[k]));
+    };
+    low[k] = cell(blade.lo[d], -2);
+    high[k] = cell(blade.hi[d], 2);
+  }
+  std::vector<std::int32_t> numbers;
+  body.add_leaves_between(low, high, numbers);
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
 /// Each end keeps the nearest of the crossings of one link. A link that was cut before may stand
 /// open: then a crossing counts for the end whose material it is in alone, if it is nearer than
 /// what is recorded.
@@ -315,27 +336,11 @@ bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
          cut.end[1].distance < recorded.end[1].distance;
 }
 
-}  // namespace
-
-CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
-             std::int32_t cut_id) {
-  expects(cut_id > 0, "a blade needs a cut id of at least 1; 0 is the body's own surface");
-  expects(corners.empty() || corners.size() == 8 * body.leaf_count(),
-          "the deformed positions must number eight for each leaf of the body");
-  check_finite(blade, "the blade");
-  CutEvent event;
-  event.cut_id = cut_id;
-  event.cells_before = event.cells_after = body.leaf_count();
-  if (blade.triangles.empty()) return event;
-
-  const Box3 body_box = bounds_of(body, corners), blade_box = bounds_of(blade);
-  const double body_size = largest(body_box.extent()), blade_size = largest(blade_box.extent());
-  expects(blade_size <= kMaxBladeRatio * body_size,
-          text("the blade is ", blade_size, " m large and the body ", body_size,
-               " m: check the units of the blade"));
-  if (!body_box.overlaps(blade_box)) return event;
-
-  LinkSearch search(body, corners, body_box, blade_box);
+/// What the blade pass of `leaves` does to the body. Needs  a blade with triangles.
+CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box,
+                    std::span<const std::int32_t> numbers, std::span<const Vec3d> corners,
+                    const TriangleMesh& blade, CutEvent event) {
+  LinkSearch search(body, numbers, corners, body_box, bounds_of(blade));
   for (const auto& t : blade.triangles)
     search.add({blade.points[static_cast<std::size_t>(t[0])],
                 blade.points[static_cast<std::size_t>(t[1])],
@@ -344,6 +349,7 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
 
   // From here on the body changes, and nothing in the input can be wrong any more.
   const Lattice lattice = body.lattice();
+  const std::size_t splits_before = body.splits().size();
   for (std::size_t begin = 0, end = 0; begin < hits.size(); begin = end) {
     const LinkKey key = hits[begin].key;
     while (end < hits.size() && hits[end].key == key) ++end;
@@ -351,13 +357,70 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
     const int axis = Lattice::link_axis(key);
     const LinkCut* before = body.record(lower, axis);
     const LinkCut record =
-        nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id, before);
+        nearest({hits.data() + begin, end - begin}, lattice.spacing, event.cut_id, before);
     ++event.links_hit;
     if (before != nullptr && comes_nearer(record, *before)) event.moved.push_back(key);
     if (body.disconnect(lower, axis, record)) event.disconnected.push_back(key);
   }
+  event.split.assign(body.splits().begin() + static_cast<std::ptrdiff_t>(splits_before),
+                     body.splits().end());
   event.cells_after = body.leaf_count();
   return event;
+}
+
+/// Whether the blade can meet the body at all. @throws Error if it makes no sense.
+bool meets(const Box3& body, const TriangleMesh& blade) {
+  check_finite(blade, "the blade");
+  if (blade.triangles.empty()) return false;
+  const Box3 blade_box = bounds_of(blade);
+  const double body_size = largest(body.extent()), blade_size = largest(blade_box.extent());
+  expects(blade_size <= kMaxBladeRatio * body_size,
+          text("the blade is ", blade_size, " m large and the body ", body_size,
+               " m: check the units of the blade"));
+  return body.overlaps(blade_box);
+}
+
+CutEvent begin_event(const LinkedOctree& body, std::int32_t cut_id) {
+  expects(cut_id > 0, "a blade needs a cut id of at least 1; 0 is the body's own surface");
+  CutEvent event;
+  event.cut_id = cut_id;
+  event.cells_before = event.cells_after = body.leaf_count();
+  return event;
+}
+
+}  // namespace
+
+Box3 reach_of(const TriangleMesh& blade) {
+  constexpr double kRounding = 1e-10;  // the integers of a blade are 2^40 to some times its size
+  Box3 box = bounds_of(blade);
+  inflate(box, kRounding * largest(box.extent()));
+  return box;
+}
+
+CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
+             std::int32_t cut_id) {
+  const CutEvent event = begin_event(body, cut_id);
+  expects(corners.empty() || corners.size() == 8 * body.leaf_count(),
+          "the deformed positions must number eight for each leaf of the body");
+  const Box3 body_box = bounds_of(body, corners);
+  if (!meets(body_box, blade)) return event;
+  std::vector<std::int32_t> numbers;
+  if (corners.empty()) {
+    numbers = leaves_at_rest(body, bounds_of(blade));
+  } else {
+    numbers.resize(body.leaf_count());
+    std::iota(numbers.begin(), numbers.end(), 0);
+  }
+  return cut_leaves(body, body_box, numbers, corners, blade, event);
+}
+
+CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
+                  std::int32_t cut_id) {
+  const CutEvent event = begin_event(body, cut_id);
+  expects(leaves.corners.size() == 8 * leaves.numbers.size(),
+          "the deformed positions must number eight for each leaf near the blade");
+  if (!meets(leaves.bounds, blade)) return event;
+  return cut_leaves(body, leaves.bounds, leaves.numbers, leaves.corners, blade, event);
 }
 
 }  // namespace kerf

@@ -21,11 +21,31 @@ struct CutEvent {
   std::vector<LinkKey> disconnected;  ///< those of them that were connected before, ascending
   std::vector<LinkKey> moved;         ///< those that were cut before, where it passed nearer to an
                                       ///< end than all cuts so far, ascending
+  std::vector<std::int32_t> split;    ///< the number of each leaf that was split, in their order:
+                                      ///< the i-th left its place to its first child and
+                                      ///< appended cells_before + 7 i .. cells_before + 7 i + 6
   std::size_t cells_before = 0;       ///< leaves before and after
   std::size_t cells_after = 0;
   /// Whether the structure of cells and vertices changed; the surface may have moved all the same.
   bool changed() const { return !disconnected.empty() || cells_before != cells_after; }
 };
+
+/// Where the leaves near a blade lie.
+struct DeformedLeaves {
+  Box3 bounds;                        ///< of the whole body, m
+  std::vector<std::int32_t> numbers;  ///< places in body.leaves(), ascending; all that the blade
+                                      ///< may meet, and as many others as one likes
+  std::vector<Vec3d> corners;         ///< eight for each of them, corner x + 2y + 4z, m
+};
+
+/// The box that holds all that a blade may meet, rounding included.
+Box3 reach_of(const TriangleMesh& blade);
+/// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met: those that were cut
+/// before may reach beyond their leaf, by half of its extent.
+inline bool may_meet(const Box3& leaf, const Box3& reach) {
+  const Vec3d beyond = 0.51 * leaf.extent();  // a little more, for rounding
+  return Box3{leaf.lo - beyond, leaf.hi + beyond}.overlaps(reach);
+}
 
 /// Cuts `body` with `blade`.
 ///
@@ -44,5 +64,8 @@ struct CutEvent {
 ///         million times larger than the body. The body is unchanged after a throw.
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
              std::int32_t cut_id);
+/// The same, from the corners of the leaves near the blade alone.
+CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
+                  std::int32_t cut_id);
 
 }  // namespace kerf

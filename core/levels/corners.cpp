@@ -21,9 +21,9 @@ std::vector<double> transfer_values(const Level& before, std::span<const double>
   for (std::int32_t v = 0; v < after.vertices(); ++v) {
     // The field is continuous over links, so any cell gives the value; one that has the vertex as
     // its own corner exists, and the first is as good as any.
-    for (std::int32_t k = after.incidence_begin[v]; k < after.incidence_begin[v + 1]; ++k) {
-      const std::int32_t cell = after.incidence[k] / 8;
-      const int slot = after.incidence[k] % 8;
+    for (const std::int32_t k : after.incidences_of(v)) {
+      const std::int32_t cell = k / 8;
+      const int slot = k % 8;
       if ((after.fold[cell] >> slot) & 1) continue;  // the vertex lies outside this cell
       const std::int32_t old = origin[cell];
       Vec3d corners[8];

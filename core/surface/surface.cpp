@@ -56,7 +56,7 @@ void Surface::rebuild(const LinkedOctree& body, std::vector<GridKey> points) {
 }
 
 void Surface::bind(const LinkedOctree& body) {
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const std::vector<std::int32_t>& leaves = body.leaves();
   std::vector<std::int32_t> cell_of(body.nodes().size(), -1);
   for (std::size_t i = 0; i < leaves.size(); ++i)
     cell_of[static_cast<std::size_t>(leaves[i])] = static_cast<std::int32_t>(i);
