@@ -33,6 +33,7 @@ double largest(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), 
 
 /// A triangle on the integer lattice, and its plane in doubles for quick rejection.
 struct BladeTriangle {
+  std::array<Vec3d, 3> corners{};
   std::array<Int3, 3> points{};
   Box3 box;        ///< with the margin that covers rounding
   Vec3d normal{};  ///< unit
@@ -96,7 +97,8 @@ class LinkSearch {
  public:
   /// `corners` holds eight for each leaf of `numbers`, or none in the reference state.
   LinkSearch(const LinkedOctree& body, std::span<const std::int32_t> numbers,
-             std::span<const Vec3d> corners, const Box3& body_box, const Box3& blade_box)
+             std::span<const Vec3d> corners, const Box3& body_box, const TriangleMesh& blade,
+             const Box3& blade_box)
       : body_(body),
         quantiser_(quantiser_box(body_box, blade_box)),
         // Small query boxes along a slanted triangle, but not too many if the body has grown.
@@ -105,22 +107,17 @@ class LinkSearch {
                 32 * std::numeric_limits<double>::epsilon() *
                     std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box.lo),
                               largest(blade_box.hi)})),
+        triangles_(prepare(blade)),
         near_(leaves_near(numbers, corners, blade_box)),
         tree_(boxes_),
         tested_(near_.size(), -1) {}
 
-  /// Adds the crossings with one triangle.
-  void add(const std::array<Vec3d, 3>& triangle) {
-    ++number_;
-    for (std::size_t i = 0; i < 3; ++i) blade_.points[i] = quantiser_(triangle[i]);
-    blade_.normal = unit_normal(blade_.points);
-    if (blade_.normal == Vec3d{}) return;
-    blade_.point = quantiser_.position(blade_.points[0]);
-    blade_.margin = margin_;
-    blade_.box = {};
-    for (const Vec3d& p : triangle) blade_.box.add(p);
-    inflate(blade_.box, margin_);
-    search(triangle);
+  void run() {
+    for (const BladeTriangle& triangle : triangles_) {
+      ++number_;
+      blade_ = triangle;
+      search(triangle.corners);
+    }
   }
 
   /// All crossings so far, by link.
@@ -131,6 +128,35 @@ class LinkSearch {
   }
 
  private:
+  /// The triangles that have an area.
+  std::vector<BladeTriangle> prepare(const TriangleMesh& blade) const {
+    std::vector<BladeTriangle> out;
+    for (const auto& indices : blade.triangles) {
+      BladeTriangle t;
+      for (std::size_t i = 0; i < 3; ++i) {
+        t.corners[i] = blade.points[static_cast<std::size_t>(indices[i])];
+        t.points[i] = quantiser_(t.corners[i]);
+        t.box.add(t.corners[i]);
+      }
+      t.normal = unit_normal(t.points);
+      if (t.normal == Vec3d{}) continue;
+      t.point = quantiser_.position(t.points[0]);
+      t.margin = margin_;
+      inflate(t.box, margin_);
+      out.push_back(t);
+    }
+    return out;
+  }
+
+  /// Whether a box can meet the blade; a blade of many triangles is not looked at closely.
+  bool may_meet_blade(const Box3& box) const {
+    constexpr std::size_t kFew = 16;
+    return triangles_.size() > kFew ||
+           std::any_of(triangles_.begin(), triangles_.end(), [&](const BladeTriangle& t) {
+             return box.overlaps(t.box) && t.near_plane(box);
+           });
+  }
+
   /// The leaves whose boxes the blade's box meets; their boxes go to boxes_.
   std::vector<CellMap> leaves_near(std::span<const std::int32_t> numbers,
                                    std::span<const Vec3d> corners, Box3 blade_box) {
@@ -145,7 +171,7 @@ class LinkSearch {
       // Parts of links that were cut may reach beyond the cell.
       for (int face = 0; node.size_log2 == 0 && face < 6; ++face)
         if ((node.cut_mask >> face & 1) != 0) box.add(cell.position_at(far_end(node.corner, face)));
-      if (!box.overlaps(blade_box)) continue;
+      if (!box.overlaps(blade_box) || !may_meet_blade(box)) continue;
       near.push_back(cell);
       masks_.push_back(node.size_log2 == 0 ? node.cut_mask : std::uint8_t{0});
       boxes_.push_back(box);
@@ -255,6 +281,7 @@ class LinkSearch {
   Quantiser quantiser_;
   double reach_;                     // of the parts of a triangle that are searched at a time, m
   double margin_;                    // covers the rounding of every box, m
+  std::vector<BladeTriangle> triangles_;
   std::vector<Box3> boxes_;          // of the leaves near the blade
   std::vector<std::uint8_t> masks_;  // and which links of theirs were cut before
   std::vector<CellMap> near_;
@@ -304,7 +331,7 @@ std::vector<std::int32_t> leaves_at_rest(const LinkedOctree& body, const Box3& b
   }
   std::vector<std::int32_t> numbers;
   body.add_leaves_between(low, high, numbers);
-  std::sort(numbers.begin(), numbers.end());
+  if (!std::is_sorted(numbers.begin(), numbers.end())) std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
 
@@ -340,11 +367,8 @@ bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
 CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box,
                     std::span<const std::int32_t> numbers, std::span<const Vec3d> corners,
                     const TriangleMesh& blade, CutEvent event) {
-  LinkSearch search(body, numbers, corners, body_box, bounds_of(blade));
-  for (const auto& t : blade.triangles)
-    search.add({blade.points[static_cast<std::size_t>(t[0])],
-                blade.points[static_cast<std::size_t>(t[1])],
-                blade.points[static_cast<std::size_t>(t[2])]});
+  LinkSearch search(body, numbers, corners, body_box, blade, bounds_of(blade));
+  search.run();
   const std::vector<Hit> hits = search.take_hits();
 
   // From here on the body changes, and nothing in the input can be wrong any more.

@@ -375,7 +375,7 @@ bool LinkedOctree::disconnect(const Vec3i& c, int axis, const LinkCut& cut) {
           "only a link between two cells that hold material can be disconnected");
   // Rules 1 and 3: the 3 x 3 cells around each end, in the plane of the shared face.
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  for (int side = 0; side < 2; ++side)
+  for (int side = 0; side < 2 && refinement_ > 0; ++side)
     for (int i = -1; i <= 1; ++i)
       for (int j = -1; j <= 1; ++j)
         refine_to_finest(shifted(shifted(shifted(c, axis, side), u, i), v, j));

@@ -99,20 +99,19 @@ class Regroup {
     for (std::size_t i = 0; i < members_.size(); ++i) {
       const std::int32_t a = members_[i];
       if (!merges(a)) continue;
+      // Links towards the high side that stay in the block lead to cells of the same size.
+      int stay = 0;
+      for (int d = 0; d < 3; ++d)
+        if (((fine_.corner[a][d] >> log2_) & 1) == 0) stay |= 2 << (2 * d);
       for (const std::int32_t item : fine_.links_of(a)) {
-        const std::int32_t b = item / 8;
-        if (b > a || !merges(b) || !same_block(a, b)) continue;
-        const auto at = std::lower_bound(members_.begin(), members_.end(), b);
-        ensures(at != members_.end() && *at == b, "a block is joined to another cell's child");
+        if ((stay >> (item % 8) & 1) == 0) continue;
+        const auto at = std::lower_bound(members_.begin(), members_.end(), item / 8);
+        ensures(at != members_.end() && *at == item / 8,
+                "a block is joined to another cell's child");
         unite(i, static_cast<std::size_t>(at - members_.begin()));
       }
     }
     for (std::size_t i = 0; i < members_.size(); ++i) first_[i] = find(i);
-  }
-  bool same_block(std::int32_t a, std::int32_t b) const {
-    for (int d = 0; d < 3; ++d)
-      if (fine_.corner[a][d] >> (log2_ + 1) != fine_.corner[b][d] >> (log2_ + 1)) return false;
-    return true;
   }
   std::size_t find(std::size_t i) const {
     while (first_[i] != i) i = first_[i];
@@ -286,7 +285,8 @@ void LevelUpdater::coarsen(Hierarchy& hierarchy, std::size_t index) {
       [&](std::int32_t cell, Cells& row) {
         for (const std::int32_t child : coarse.children_of(cell))
           for (const std::int32_t item : fine.links_of(child))
-            if (fine.parent[item / 8] != cell) row.push_back(8 * fine.parent[item / 8] + item % 8);
+            if (const std::int32_t other = fine.parent[item / 8]; other != cell)
+              add_once(row, 8 * other + item % 8);
       },
       touched.relinked);
   update_vertices(coarse, touched, log);

@@ -143,27 +143,27 @@ class VertexUpdate {
         ensures(v < 0 || c.vertex < 0 || c.vertex == v, "a cut merged two vertices");
         c.vertex = std::max(c.vertex, v);
       }
-    // Of those that were one vertex, the first by place keeps it.
-    std::vector<std::int32_t> order(components_.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      const Component &x = components_[a], &y = components_[b];
-      return std::tuple(x.vertex, x.first_place) < std::tuple(y.vertex, y.first_place);
-    });
-    std::int32_t last = -1;
-    for (const std::int32_t i : order) {
-      std::int32_t& v = components_[i].vertex;
-      if (v >= 0 && v == last)
-        v = -1;
-      else
-        last = v;
+    // Of those that were one vertex, the first by place keeps it; the others are numbered by place.
+    struct Claim {
+      std::int32_t vertex, first_place, component;
+    };
+    std::vector<Claim> claims, fresh;
+    claims.reserve(components_.size());
+    for (std::size_t i = 0; i < components_.size(); ++i) {
+      const Component& c = components_[i];
+      if (c.master >= 0) continue;
+      (c.vertex < 0 ? fresh : claims)
+          .push_back({c.vertex, c.first_place, static_cast<std::int32_t>(i)});
     }
-    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      return components_[a].first_place < components_[b].first_place;
+    std::sort(claims.begin(), claims.end(), [](const Claim& a, const Claim& b) {
+      return std::tuple(a.vertex, a.first_place) < std::tuple(b.vertex, b.first_place);
     });
-    for (const std::int32_t i : order) {
-      Component& c = components_[i];
-      if (c.vertex >= 0 || c.master >= 0) continue;
+    for (std::size_t i = 1; i < claims.size(); ++i)
+      if (claims[i].vertex == claims[i - 1].vertex) fresh.push_back(claims[i]);
+    std::sort(fresh.begin(), fresh.end(),
+              [](const Claim& a, const Claim& b) { return a.first_place < b.first_place; });
+    for (const Claim& claim : fresh) {
+      Component& c = components_[claim.component];
       c.vertex = level_.vertices();
       level_.point.push_back(c.point);
       level_.fixed.push_back(0);

@@ -3,7 +3,9 @@
 // The parts of an update (update.hpp) that work on one level.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <vector>
 
@@ -56,6 +58,13 @@ class ChangeLog {
   LevelChange& change_;
   UpdateScratch& scratch_;
 };
+
+/// Adds a link, unless it is among the last few.
+inline void add_once(std::vector<std::int32_t>& row, std::int32_t item) {
+  constexpr std::ptrdiff_t kFew = 12;
+  const auto from = row.end() - std::min<std::ptrdiff_t>(kFew, std::ssize(row));
+  if (std::find(from, row.end(), item) == row.end()) row.push_back(item);
+}
 
 /// Gives the rows of links of `cells` (ascending, all new ones among them) anew and tells which old
 /// ones changed. new_row(cell, out) appends the links of a cell, some of them twice perhaps.
