@@ -34,6 +34,7 @@ class CpuBackend final : public Backend {
   explicit CpuBackend(const CpuOptions& options)
       : threads_(options.threads > 0 ? options.threads : omp_get_max_threads()),
         tile_log2_(options.tile_log2),
+        updates_(options.updates),
         coarsest_factor_(CholeskyEngine::simplicial) {
     expects(options.threads >= 0 && options.threads <= kMaxThreads,
             text("solver.threads must lie in 0 .. ", kMaxThreads, "; 0 takes all cores"));
@@ -44,6 +45,8 @@ class CpuBackend final : public Backend {
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;
+  bool can_update() const noexcept override { return updates_; }
+  void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override { smoother_ = options; }
   int add_vector() override;
 
@@ -81,6 +84,11 @@ class CpuBackend final : public Backend {
   void mask(int level, int x) override;
   void write(int level, int x, std::span<const double> values) override;
   void read(int level, int x, std::span<double> values) const override;
+  void write_some(int level, int x, std::span<const std::int32_t> vertices,
+                  std::span<const double> values) override;
+  void read_some(int level, int x, std::span<const std::int32_t> vertices,
+                 std::span<double> values) const override;
+  NearCells find_near(int displacement, const Box3& reach) const override;
 
  private:
   // Calls body(i) for i in [0, count), the range cut into one slab a thread. Below `worth` items,
@@ -93,6 +101,7 @@ class CpuBackend final : public Backend {
   static constexpr std::int32_t kWorthCells = 512;      // hundreds of operations an item
   static constexpr std::int32_t kWorthVertices = 4096;  // tens
   static constexpr std::int32_t kWorthScalars = 65536;  // one or two
+  void fit_to_levels();
   template <class CellBody>
   void cells_to_vertices(LevelStore& store, double* out, bool masks, const CellBody& body);
   void gauss_seidel(LevelStore& store, int level, SweepOrder order);
@@ -107,6 +116,7 @@ class CpuBackend final : public Backend {
 
   int threads_;
   int tile_log2_;
+  bool updates_;
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   FinestStore finest_;
@@ -145,21 +155,37 @@ void CpuBackend::load(const Hierarchy& hierarchy) {
     store.level = &hierarchy.levels[l];
     store.finest = l == 0 ? &finest_ : nullptr;
     store.tile_log2 = tile_log2_;
+    store.vectors.clear();
+    store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
+  }
+  fit_to_levels();
+}
+
+// Arrays of the sizes of the levels. Vectors are longer by zeros; of the rest nothing is kept.
+void CpuBackend::fit_to_levels() {
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    LevelStore& store = levels_[l];
     store.bound = 0;
     store.solution_is_zero = false;
     store.colours = {};
-    store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (auto& vector : store.vectors)
-      vector.assign(3 * static_cast<std::size_t>(store.vertices()), 0.0);
+      vector.resize(3 * static_cast<std::size_t>(store.vertices()), 0.0);
     store.products.resize(8 * static_cast<std::size_t>(store.cells()));
-    store.inverse_diagonal.assign(store.vertices(), {});
-    store.matrices.clear();
+    store.inverse_diagonal.resize(store.vertices());
     if (l > 0)
       store.matrices.resize(
           kernels::tiled_size(static_cast<std::size_t>(store.cells()), kEntries, tile_log2_));
   }
   coarsest_ = std::make_unique<AssembledLevel>(*levels_.back().level);
   coarsest_factor_.analyse(*coarsest_);
+}
+
+void CpuBackend::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
+  ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
+          "a change is not one of the hierarchy that was loaded");
+  for (const std::int32_t origin : change.levels[0].origin)
+    finest_.rotation.push_back(finest_.rotation[origin]);
+  fit_to_levels();
 }
 
 int CpuBackend::add_vector() {
@@ -522,6 +548,40 @@ void CpuBackend::read(int level, int x, std::span<double> values) const {
   const auto& vector = levels_[level].vectors[x];
   expects(values.size() == vector.size(), "read: three values per vertex of the level");
   std::copy(vector.begin(), vector.end(), values.begin());
+}
+
+void CpuBackend::write_some(int level, int x, std::span<const std::int32_t> vertices,
+                            std::span<const double> values) {
+  double* to = changed(level, x);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    to[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3] = values[k];
+}
+
+void CpuBackend::read_some(int level, int x, std::span<const std::int32_t> vertices,
+                           std::span<double> values) const {
+  const double* from = levels_[level].vectors[x].data();
+  for (std::size_t k = 0; k < values.size(); ++k)
+    values[k] = from[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3];
+}
+
+NearCells CpuBackend::find_near(int displacement, const Box3& reach) const {
+  constexpr std::int32_t kChunk = 8192;
+  const std::int32_t cells = levels_[0].cells(), chunks = (cells + kChunk - 1) / kChunk;
+  std::vector<NearCells> found(chunks);
+  parallel(
+      chunks,
+      [&](std::int32_t i) {
+        found[i] = near_cells(*hierarchy_, levels_[0].vectors[displacement], reach, kChunk * i,
+                              std::min(cells, kChunk * (i + 1)));
+      },
+      2);
+  NearCells out;
+  for (const NearCells& part : found) {
+    out.finite = out.finite && part.finite;
+    out.bounds.add(part.bounds);
+    out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
+  }
+  return out;
 }
 
 }  // namespace

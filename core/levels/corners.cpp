@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "core/levels/corners.hpp"
 
+#include <cmath>
+
+#include "core/base/error.hpp"
+#include "core/body/cut.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
@@ -15,31 +19,68 @@ void corner_values(const Level& level, std::int32_t cell, std::span<const double
   kernels::unfold(slots, level.fold[cell], out);
 }
 
-std::vector<double> transfer_values(const Level& before, std::span<const double> values,
-                                    const Level& after, std::span<const std::int32_t> origin) {
-  std::vector<double> out(3 * after.point.size(), 0.0);
-  for (std::int32_t v = 0; v < after.vertices(); ++v) {
+NewVertices new_vertices(const Level& level, const LevelChange& change) {
+  NewVertices out;
+  for (std::int32_t v = change.vertices_before; v < level.vertices(); ++v) {
     // The field is continuous over links, so any cell gives the value; one that has the vertex as
     // its own corner exists, and the first is as good as any.
-    for (const std::int32_t k : after.incidences_of(v)) {
-      const std::int32_t cell = k / 8;
-      const int slot = k % 8;
-      if ((after.fold[cell] >> slot) & 1) continue;  // the vertex lies outside this cell
-      const std::int32_t old = origin[cell];
-      Vec3d corners[8];
-      corner_values(before, old, values, corners);
-      const double side = 1 << before.size_log2[old];
-      double t[3];
-      for (int d = 0; d < 3; ++d) t[d] = (after.point[v][d] - before.corner[old][d]) / side;
-      Vec3d sum{};
-      for (int i = 0; i < 8; ++i) {
-        double w = 1;
-        for (int d = 0; d < 3; ++d) w *= ((i >> d) & 1) ? t[d] : 1 - t[d];
-        if (w != 0) sum += w * corners[i];
-      }
-      for (int d = 0; d < 3; ++d) out[3 * static_cast<std::size_t>(v) + d] = sum[d];
+    std::int32_t cell = -1;
+    for (const std::int32_t k : level.incidences_of(v)) {
+      if ((level.fold[k / 8] >> (k % 8) & 1) != 0) continue;  // the vertex lies outside this cell
+      cell = k / 8;
       break;
     }
+    ensures(cell >= 0, "a vertex is no corner of any cell");
+    if (cell >= change.cells_before) cell = change.origin[cell - change.cells_before];
+    const CellBefore was = change.cell_before(level, cell);
+    double fold[8][8], at[8] = {};
+    kernels::fold_weights(was.fold, fold);
+    for (int i = 0; i < 8; ++i) {
+      double w = 1;
+      for (int d = 0; d < 3; ++d) {
+        const double t = 1.0 * (level.point[v][d] - was.corner[d]) / (1 << was.size_log2);
+        w *= ((i >> d) & 1) ? t : 1 - t;
+      }
+      if (w == 0) continue;
+      for (int j = 0; j < 8; ++j) at[j] += w * fold[i][j];
+    }
+    for (int j = 0; j < 8; ++j) {
+      if (at[j] == 0) continue;
+      out.source.push_back(was.slots[j]);
+      out.weight.push_back(at[j]);
+    }
+    out.begin.push_back(static_cast<std::int32_t>(out.source.size()));
+  }
+  return out;
+}
+
+std::vector<double> NewVertices::combine(std::span<const double> of_sources) const {
+  std::vector<double> out(3 * (begin.size() - 1), 0.0);
+  for (std::size_t v = 0; v + 1 < begin.size(); ++v)
+    for (std::int32_t k = begin[v]; k < begin[v + 1]; ++k)
+      for (std::size_t d = 0; d < 3; ++d)
+        out[3 * v + d] += weight[k] * of_sources[3 * static_cast<std::size_t>(k) + d];
+  return out;
+}
+
+NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
+                     const Box3& reach, std::int32_t first, std::int32_t last) {
+  const Level& level = hierarchy.levels[0];
+  NearCells out;
+  for (std::int32_t c = first; c < last; ++c) {
+    Box3 box;
+    double sum = 0;
+    for (const std::int32_t v : level.slots[c]) {
+      const double* u = displacement.data() + 3 * static_cast<std::size_t>(v);
+      const Vec3i& x = level.point[v];
+      const Vec3d p{x[0] * hierarchy.spacing + u[0], x[1] * hierarchy.spacing + u[1],
+                    x[2] * hierarchy.spacing + u[2]};
+      box.add(p);
+      sum += p.x + p.y + p.z;
+    }
+    out.finite = out.finite && std::isfinite(sum);
+    out.bounds.add(box);
+    if (may_meet(box, reach)) out.cells.push_back(c);
   }
   return out;
 }

@@ -4,8 +4,15 @@
 // how many blades.
 #include <gtest/gtest.h>
 
+#include <numeric>
+#include <set>
+
 #include "core/body/cut.hpp"
+#include "core/body/pieces.hpp"
+#include "core/fem/loads.hpp"
+#include "core/levels/piece_labels.hpp"
 #include "core/levels/update.hpp"
+#include "core/surface/surface.hpp"
 #include "tests/support/cut_oracle.hpp"
 #include "tests/support/level_match.hpp"
 #include "tests/support/random_blades.hpp"
@@ -43,6 +50,55 @@ std::vector<Vec3d> deformed_corners(const LinkedOctree& body, test::Dice& dice) 
   });
 }
 
+/// Every vertex of the surface moves with the leaf around its finest cell.
+void expect_bound_where_they_lie(const LinkedOctree& body, const Surface& surface) {
+  const SurfaceView view = surface.view();
+  for (std::size_t v = 0; v < view.points.size(); ++v) {
+    const bool used = surface.store().used[v] != 0;
+    ASSERT_EQ(view.points[v].cell >= 0, used);
+    if (!used) continue;
+    const std::int32_t leaf = body.leaf_at(surface.store().finest_cell[v]);
+    ASSERT_EQ(view.points[v].cell, body.leaf_number(leaf)) << "vertex " << v;
+    const auto& node = body.nodes()[static_cast<std::size_t>(leaf)];
+    const double side = body.lattice().spacing * (1 << node.size_log2);
+    const Vec3d& x = surface.store().reference[v];
+    ASSERT_EQ(view.points[v].reference, x);
+    ASSERT_EQ(view.points[v].local, (1 / side) * (x - body.lattice().point(node.corner)));
+  }
+}
+
+/// Forces at vertices by themselves have the bits of those at all, and only vertices of changed
+/// cells see other forces than before.
+void expect_same_forces(const LinkedOctree& body, Hierarchy levels, Hierarchy before,
+                        const LevelChange& change) {
+  const auto set_values = [&](Hierarchy& h) {
+    h.spacing = body.lattice().spacing;
+    h.values.clear();
+    for (const std::uint8_t log2 : h.levels[0].size_log2) {
+      const double side = h.spacing * (1 << log2);
+      h.values.push_back({side, side * side * side, 0});
+    }
+  };
+  set_values(levels);
+  set_values(before);
+  const Vec3d o = body.lattice().origin;
+  const ExternalForce force(body.lattice(),
+                            {Gravity{{1, 2, 3}}, BoxForce{{o, o + Vec3d{0.4, 9, 9}}, {1, 2, 3}},
+                             RadialForce{{0, 0, 0}, {0, 1, 0}, 2}},
+                            levels.levels[0]);
+  const std::vector<double> all = force.on_all(levels), old = force.on_all(before);
+  std::vector<std::int32_t> vertices(levels.levels[0].point.size());
+  std::iota(vertices.begin(), vertices.end(), 0);
+  ASSERT_EQ(force.on(levels, vertices), all);
+  std::set<std::int32_t> touched(change.vertices.begin(), change.vertices.end());
+  for (const std::int32_t c : change.cells)
+    for (const std::int32_t v : levels.levels[0].slots[c]) touched.insert(v);
+  for (std::size_t k = 0; k < old.size(); ++k)
+    if (touched.count(static_cast<std::int32_t>(k / 3)) == 0) {
+      ASSERT_EQ(all[k], old[k]) << "vertex " << k / 3;
+    }
+}
+
 struct Counts {
   int updates = 0, rebuilds = 0;
 };
@@ -55,6 +111,10 @@ void cut_one_body(std::uint64_t seed, int blades, Counts& counts) {
   test::RandomBlades random(voxels.lattice, dice);
   Hierarchy levels = build(body, options);
   LevelUpdater updater;
+  PieceLabels labels;
+  labels.build(levels.levels[0]);
+  Surface surface(body, SurfaceMethod::dual_contouring);
+  surface.bind(body);
   for (int i = 0; i < blades; ++i) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ", blade " << i);
     std::vector<Vec3d> corners;
@@ -78,6 +138,14 @@ void cut_one_body(std::uint64_t seed, int blades, Counts& counts) {
       // A rebuild is asked for only where the number of levels asks for it.
       ASSERT_EQ(before.levels.size(), anew.levels.size());
     }
+    labels.update(body, event, levels.levels[0], updater.change().levels[0]);
+    std::size_t pieces = 0;
+    ASSERT_EQ(labels.by_first_cell(), label_pieces(body, &pieces));
+    ASSERT_EQ(labels.count(), pieces);
+    surface.update(body, event);
+    surface.bind(body);
+    ASSERT_NO_FATAL_FAILURE(expect_bound_where_they_lie(body, surface));
+    ASSERT_NO_FATAL_FAILURE(expect_same_forces(body, levels, before, updater.change().levels[0]));
     if (dice.roll(4) == 0) levels.pack();
   }
 }

@@ -225,7 +225,7 @@ TEST(Levels, UniformBodiesNeedEightColours) {
 
 using Links = std::vector<std::array<int, 3>>;  // {a, b, axis}
 
-Links links_of(const Level& level) {
+Links link_list(const Level& level) {
   Links out;
   for (const CellLink& link : links_of(level)) out.push_back({link.a, link.b, link.axis});
   return out;
@@ -261,7 +261,7 @@ TEST(LevelsByHand, SlabWithAnL) {
   EXPECT_EQ(h.levels[2].parent, (std::vector<std::int32_t>{0, 0, 0}));
   EXPECT_EQ(h.levels[1].corner[1], h.levels[1].corner[2]);  // B and B' share their place
   EXPECT_EQ(h.levels[2].corner[0], h.levels[2].corner[1]);
-  EXPECT_EQ(links_of(h.levels[1]), (Links{{0, 1, 0},     // A-B  over 1-2
+  EXPECT_EQ(link_list(h.levels[1]), (Links{{0, 1, 0},     // A-B  over 1-2
                                           {0, 4, 1},     // A-D
                                           {1, 3, 0},     // B-C  over 3-4
                                           {1, 5, 1},     // B-E  over 8-14
@@ -270,8 +270,8 @@ TEST(LevelsByHand, SlabWithAnL) {
                                           {3, 7, 1},     // C-F
                                           {4, 5, 0},     // D-E
                                           {6, 7, 0}}));  // E'-F over 15-16; E has no link to E', F
-  EXPECT_EQ(links_of(h.levels[2]), (Links{{0, 2, 0}, {1, 2, 0}}));
-  EXPECT_TRUE(links_of(h.levels[3]).empty());
+  EXPECT_EQ(link_list(h.levels[2]), (Links{{0, 2, 0}, {1, 2, 0}}));
+  EXPECT_TRUE(link_list(h.levels[3]).empty());
 
   // Of 7 x 5 grid points in a plane, those on the L have two vertices, but not its tip (5, 1):
   // (3, 4), (3, 3), (3, 2), the bend (3, 1), and (4, 1). Two planes.
@@ -289,7 +289,7 @@ TEST(LevelsByHand, SlabWithAnLMergedByPlace) {
   ASSERT_EQ(h.levels.size(), 4u);
   EXPECT_EQ(h.levels[1].cells(), 6);
   EXPECT_EQ(h.levels[1].vertices(), 24);
-  EXPECT_EQ(links_of(h.levels[1]).size(), 7u);
+  EXPECT_EQ(link_list(h.levels[1]).size(), 7u);
   EXPECT_EQ(h.levels[2].cells(), 2);
 }
 
@@ -342,7 +342,7 @@ TEST(LevelsByHand, OctreeWithAnL) {
   std::array<int, 3> count{};
   for (const CellLink& link : links_of(one)) ++count[link.axis];
   EXPECT_EQ(count, (std::array<int, 3>{36, 34, 34}));
-  EXPECT_EQ(links_of(h.levels[3]).size(), 1u);
+  EXPECT_EQ(link_list(h.levels[3]).size(), 1u);
 }
 
 // ---- Supports -----------------------------------------------------------------------------------
