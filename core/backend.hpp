@@ -127,8 +127,8 @@ class Backend {
                           std::span<const double> values);
   virtual void read_some(int level, int x, std::span<const std::int32_t> vertices,
                          std::span<double> values) const;
-  /// What a blade may meet: near_cells in core/levels/corners.hpp over all cells of level 0.
-  virtual NearCells find_near(int displacement, const Box3& reach) const;
+  /// What a blade may meet: as near_cells in core/levels/corners.hpp.
+  virtual NearCells find_near(int displacement, const BladeReach& reach) const;
 };
 
 }  // namespace kerf

@@ -86,7 +86,7 @@ struct Simulation::Impl {
   void check_memory() const;
   CutEvent make_cut(const DueCut& due);
   bool apply_cut(const DueCut& due, StepReport& report);
-  DeformedLeaves leaves_near(const Box3& reach) const;
+  DeformedLeaves leaves_near(const TriangleMesh& blade) const;
   std::array<std::pair<int, bool>, 3> state_vectors() const;
   double natural_time() const;
   void copy_state(const StateVectors& from, const StateVectors& to);
@@ -245,17 +245,17 @@ double Simulation::Impl::natural_time() const {
 }
 
 // The deformed leaves that a blade may meet.
-DeformedLeaves Simulation::Impl::leaves_near(const Box3& reach) const {
+DeformedLeaves Simulation::Impl::leaves_near(const TriangleMesh& blade) const {
   const Vec3d origin = body.lattice().origin;
-  const Box3 local{reach.lo - origin, reach.hi - origin};
+  const BladeReach reach(blade, origin);
   const Level& level = finest();
   NearCells near;
   std::vector<double> all, of_slots;
   if (backend->can_update()) {
-    near = backend->find_near(state.displacement, local);
+    near = backend->find_near(state.displacement, reach);
   } else {
     all = read_vector(state.displacement);
-    near = near_cells(hierarchy(), all, local, 0, level.cells());
+    near = near_cells(hierarchy(), all, reach);
   }
   expects(near.finite && std::isfinite(norm(near.bounds.extent())),
           "the deformed positions of the body are not finite: the simulation has diverged");
@@ -277,7 +277,7 @@ CutEvent Simulation::Impl::make_cut(const DueCut& due) {
   const AddTime timer(clock.cut);
   if (!due.deformed || due.blade.triangles.empty()) return cut(body, {}, due.blade, due.cut_id);
   check_finite(due.blade, "the blade");
-  return cut_near(body, leaves_near(reach_of(due.blade)), due.blade, due.cut_id);
+  return cut_near(body, leaves_near(due.blade), due.blade, due.cut_id);
 }
 
 bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {

@@ -89,8 +89,16 @@ bool Structure::update(const LinkedOctree& body, const CutEvent& event) {
 std::vector<std::int32_t> Structure::reloaded() const {
   const LevelChange& change = finest_change();
   std::vector<std::int32_t> out = change.vertices;
-  for (const std::int32_t cell : change.cells)
-    out.insert(out.end(), finest().slots[cell].begin(), finest().slots[cell].end());
+  for (std::size_t i = 0; i < change.before.size(); ++i) {
+    const std::int32_t c = change.cells[i];
+    const CellBefore& was = change.before[i];
+    // From a cell of the same shape the same shares go out, to vertices that are listed or were not
+    // changed.
+    if (was.size_log2 == finest().size_log2[c] && was.fold == finest().fold[c]) continue;
+    out.insert(out.end(), finest().slots[c].begin(), finest().slots[c].end());
+  }
+  for (std::int32_t c = change.cells_before; c < finest().cells(); ++c)
+    out.insert(out.end(), finest().slots[c].begin(), finest().slots[c].end());
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;

@@ -88,7 +88,7 @@ class CpuBackend final : public Backend {
                   std::span<const double> values) override;
   void read_some(int level, int x, std::span<const std::int32_t> vertices,
                  std::span<double> values) const override;
-  NearCells find_near(int displacement, const Box3& reach) const override;
+  NearCells find_near(int displacement, const BladeReach& reach) const override;
 
  private:
   // Calls body(i) for i in [0, count), the range cut into one slab a thread. Below `worth` items,
@@ -564,23 +564,27 @@ void CpuBackend::read_some(int level, int x, std::span<const std::int32_t> verti
     values[k] = from[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3];
 }
 
-NearCells CpuBackend::find_near(int displacement, const Box3& reach) const {
+NearCells CpuBackend::find_near(int displacement, const BladeReach& reach) const {
   constexpr std::int32_t kChunk = 8192;
-  const std::int32_t cells = levels_[0].cells(), chunks = (cells + kChunk - 1) / kChunk;
-  std::vector<NearCells> found(chunks);
-  parallel(
-      chunks,
-      [&](std::int32_t i) {
-        found[i] = near_cells(*hierarchy_, levels_[0].vectors[displacement], reach, kChunk * i,
-                              std::min(cells, kChunk * (i + 1)));
-      },
-      2);
+  FindNear find(*hierarchy_, levels_[0].vectors[displacement], reach);
   NearCells out;
-  for (const NearCells& part : found) {
-    out.finite = out.finite && part.finite;
-    out.bounds.add(part.bounds);
-    out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
-  }
+  const auto in_chunks = [&](std::int32_t count, const auto& look) {
+    std::vector<NearCells> found((count + kChunk - 1) / kChunk);
+    parallel(
+        static_cast<std::int32_t>(found.size()),
+        [&](std::int32_t i) { look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]); }, 2);
+    for (const NearCells& part : found) {
+      out.finite = out.finite && part.finite;
+      out.bounds.add(part.bounds);
+      out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
+    }
+  };
+  in_chunks(levels_[0].vertices(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
+    find.look_at_vertices(first, last, part);
+  });
+  in_chunks(levels_[0].cells(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
+    find.look_at_cells(first, last, part);
+  });
   return out;
 }
 

@@ -414,11 +414,44 @@ CutEvent begin_event(const LinkedOctree& body, std::int32_t cut_id) {
 
 }  // namespace
 
-Box3 reach_of(const TriangleMesh& blade) {
+BladeReach::BladeReach(const TriangleMesh& blade, const Vec3d& origin) {
   constexpr double kRounding = 1e-10;  // the integers of a blade are 2^40 to some times its size
-  Box3 box = bounds_of(blade);
-  inflate(box, kRounding * largest(box.extent()));
-  return box;
+  constexpr std::size_t kFew = 16;
+  box_ = bounds_of(blade);
+  margin_ = kRounding * (largest(box_.extent()) + largest(box_.lo) + largest(box_.hi));
+  inflate(box_, margin_);
+  box_ = {box_.lo - origin, box_.hi - origin};
+  for (std::size_t t = 0; t < blade.triangles.size() && blade.triangles.size() <= kFew; ++t) {
+    Vec3d p[3];
+    Slab slab;
+    for (std::size_t i = 0; i < 3; ++i) {
+      p[i] = blade.points[static_cast<std::size_t>(blade.triangles[t][i])] - origin;
+      slab.box.add(p[i]);
+    }
+    inflate(slab.box, margin_);
+    const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
+    // A normal of a needle is mostly rounding, and one of zero lets all pass.
+    const double area = norm(n), longest = largest(slab.box.extent());
+    slab.normal = area > 1e-6 * longest * longest ? (1 / area) * n : Vec3d{};
+    slab.point = p[0];
+    slabs_.push_back(slab);
+  }
+}
+
+bool BladeReach::may_meet(Box3 leaf, bool has_cut_links) const {
+  if (has_cut_links) {
+    const Vec3d beyond = 0.51 * leaf.extent();  // a little more, for rounding
+    leaf = {leaf.lo - beyond, leaf.hi + beyond};
+  }
+  if (!leaf.overlaps(box_)) return false;
+  return slabs_.empty() || std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& slab) {
+    if (!leaf.overlaps(slab.box)) return false;
+    const Vec3d to_center = 0.5 * leaf.lo + 0.5 * leaf.hi - slab.point;
+    double reach = margin_;
+    for (int d = 0; d < 3; ++d)
+      reach += 0.5001 * std::abs(slab.normal[d]) * (leaf.hi[d] - leaf.lo[d]);
+    return std::abs(dot(slab.normal, to_center)) <= reach;
+  });
 }
 
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,

@@ -38,14 +38,26 @@ struct DeformedLeaves {
   std::vector<Vec3d> corners;         ///< eight for each of them, corner x + 2y + 4z, m
 };
 
-/// The box that holds all that a blade may meet, rounding included.
-Box3 reach_of(const TriangleMesh& blade);
-/// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met: those that were cut
-/// before may reach beyond their leaf, by half of its extent.
-inline bool may_meet(const Box3& leaf, const Box3& reach) {
-  const Vec3d beyond = 0.51 * leaf.extent();  // a little more, for rounding
-  return Box3{leaf.lo - beyond, leaf.hi + beyond}.overlaps(reach);
-}
+/// Where a blade may meet something, rounding included: a quick test that errs on the safe side.
+class BladeReach {
+ public:
+  /// Positions that are tested count from `origin`.
+  explicit BladeReach(const TriangleMesh& blade, const Vec3d& origin = {});
+
+  const Box3& box() const { return box_; }
+  /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met. Those that were
+  /// cut before may reach beyond their leaf, by half of its extent.
+  bool may_meet(Box3 leaf, bool has_cut_links) const;
+
+ private:
+  struct Slab {
+    Box3 box;
+    Vec3d normal, point;
+  };
+  Box3 box_;
+  double margin_ = 0;
+  std::vector<Slab> slabs_;  // around triangles; none: too many to look at
+};
 
 /// Cuts `body` with `blade`.
 ///

@@ -82,25 +82,31 @@ ExternalForce::ExternalForce(const Lattice& lattice, const std::vector<Load>& lo
   }
 }
 
-// What one load does to the corners of one cell. A body force is spread evenly over it, and reaches
-// its corners in equal shares.
-void ExternalForce::on_corners(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell,
-                               Vec3d (&corners)[8]) const {
+// What one load does to the wanted slots (a bit each) of one cell. A body force is spread evenly over
+// it, and reaches its corners in equal shares.
+void ExternalForce::on_slots(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell,
+                             unsigned wanted, Vec3d (&slots)[8]) const {
   const Level& level = hierarchy.levels[0];
+  const bool hangs = (level.fold[cell] & 255) != 0;
+  if (hangs) wanted = 255;
+  Vec3d corners[8];
+  Vec3d(&out)[8] = hangs ? corners : slots;
   if (const auto* box = std::get_if<BoxForce>(&loads_[load])) {
     const Covered covered(lattice_, level, cell, box->box);
     const bool none = covered.cells() == 0;
     for (int i = 0; i < 8; ++i)
-      corners[i] = none ? Vec3d{} : (covered.corner(i) / covered_[load]) * box->force;
-    return;
+      out[i] = none ? Vec3d{} : (covered.corner(i) / covered_[load]) * box->force;
+  } else {
+    Vec3d force{};
+    if (const auto* gravity = std::get_if<Gravity>(&loads_[load]))
+      force = hierarchy.values[cell].mass * gravity->acceleration;
+    else if (const auto* radial = std::get_if<RadialForce>(&loads_[load]))
+      force = hierarchy.values[cell].mass * radial->strength *
+              away_from_axis(*radial, cell_center(lattice_, level, cell));
+    for (int i = 0; i < 8; ++i)
+      if ((wanted >> i & 1) != 0) out[i] = 0.125 * force;
   }
-  Vec3d force{};
-  if (const auto* gravity = std::get_if<Gravity>(&loads_[load]))
-    force = hierarchy.values[cell].mass * gravity->acceleration;
-  else if (const auto* radial = std::get_if<RadialForce>(&loads_[load]))
-    force = hierarchy.values[cell].mass * radial->strength *
-            away_from_axis(*radial, cell_center(lattice_, level, cell));
-  for (Vec3d& corner : corners) corner = 0.125 * force;
+  if (hangs) kernels::fold_transpose(corners, level.fold[cell], slots);
 }
 
 std::vector<double> ExternalForce::on_all(const Hierarchy& hierarchy) const {
@@ -108,14 +114,11 @@ std::vector<double> ExternalForce::on_all(const Hierarchy& hierarchy) const {
   std::vector<double> out(3 * level.point.size(), 0.0);
   for (std::size_t load = 0; load < loads_.size(); ++load)
     for (std::int32_t c = 0; c < level.cells(); ++c) {
-      Vec3d corners[8], slots[8];
-      on_corners(hierarchy, load, c, corners);
-      const bool hangs = (level.fold[c] & 255) != 0;
-      if (hangs) kernels::fold_transpose(corners, level.fold[c], slots);
+      Vec3d slots[8];
+      on_slots(hierarchy, load, c, 255, slots);
       for (int i = 0; i < 8; ++i)
         for (int d = 0; d < 3; ++d)
-          out[3 * static_cast<std::size_t>(level.slots[c][i]) + d] +=
-              hangs ? slots[i][d] : corners[i][d];
+          out[3 * static_cast<std::size_t>(level.slots[c][i]) + d] += slots[i][d];
     }
   return out;
 }
@@ -127,12 +130,9 @@ std::vector<double> ExternalForce::on(const Hierarchy& hierarchy,
   for (std::size_t k = 0; k < vertices.size(); ++k)
     for (std::size_t load = 0; load < loads_.size(); ++load)
       for (const std::int32_t item : level.incidences_of(vertices[k])) {
-        const std::int32_t c = item / 8;
-        Vec3d corners[8], slots[8];
-        on_corners(hierarchy, load, c, corners);
-        const bool hangs = (level.fold[c] & 255) != 0;
-        if (hangs) kernels::fold_transpose(corners, level.fold[c], slots);
-        for (int d = 0; d < 3; ++d) out[3 * k + d] += hangs ? slots[item % 8][d] : corners[item % 8][d];
+        Vec3d slots[8];
+        on_slots(hierarchy, load, item / 8, 1U << (item % 8), slots);
+        for (int d = 0; d < 3; ++d) out[3 * k + d] += slots[item % 8][d];
       }
   return out;
 }

@@ -31,8 +31,8 @@ class ExternalForce {
   std::vector<double> on(const Hierarchy& hierarchy, std::span<const std::int32_t> vertices) const;
 
  private:
-  void on_corners(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell,
-                  Vec3d (&corners)[8]) const;
+  void on_slots(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell, unsigned wanted,
+                Vec3d (&slots)[8]) const;
 
   Lattice lattice_;
   std::vector<Load> loads_;

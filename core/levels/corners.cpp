@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
-#include "core/body/cut.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
@@ -63,25 +62,53 @@ std::vector<double> NewVertices::combine(std::span<const double> of_sources) con
   return out;
 }
 
-NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
-                     const Box3& reach, std::int32_t first, std::int32_t last) {
-  const Level& level = hierarchy.levels[0];
-  NearCells out;
-  for (std::int32_t c = first; c < last; ++c) {
-    Box3 box;
-    double sum = 0;
-    for (const std::int32_t v : level.slots[c]) {
-      const double* u = displacement.data() + 3 * static_cast<std::size_t>(v);
-      const Vec3i& x = level.point[v];
-      const Vec3d p{x[0] * hierarchy.spacing + u[0], x[1] * hierarchy.spacing + u[1],
-                    x[2] * hierarchy.spacing + u[2]};
-      box.add(p);
-      sum += p.x + p.y + p.z;
-    }
-    out.finite = out.finite && std::isfinite(sum);
-    out.bounds.add(box);
-    if (may_meet(box, reach)) out.cells.push_back(c);
+FindNear::FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
+                   const BladeReach& reach)
+    : level_(hierarchy.levels[0]),
+      spacing_(hierarchy.spacing),
+      displacement_(displacement),
+      reach_(reach),
+      beside_(level_.point.size()) {}
+
+Vec3d FindNear::position(std::int32_t vertex) const {
+  const double* u = displacement_.data() + 3 * static_cast<std::size_t>(vertex);
+  const Vec3i& x = level_.point[vertex];
+  return {x[0] * spacing_ + u[0], x[1] * spacing_ + u[1], x[2] * spacing_ + u[2]};
+}
+
+void FindNear::look_at_vertices(std::int32_t first, std::int32_t last, NearCells& out) {
+  const Box3 box = reach_.box();
+  for (std::int32_t v = first; v < last; ++v) {
+    const Vec3d p = position(v);
+    const int beside = (p.x < box.lo.x ? 1 : 0) | (p.x > box.hi.x ? 2 : 0) |
+                       (p.y < box.lo.y ? 4 : 0) | (p.y > box.hi.y ? 8 : 0) |
+                       (p.z < box.lo.z ? 16 : 0) | (p.z > box.hi.z ? 32 : 0);
+    beside_[v] = static_cast<std::uint8_t>(beside);
+    out.bounds.add(p);
+    out.finite = out.finite && std::isfinite(p.x + p.y + p.z);
   }
+}
+
+// Only finest cells have links that were cut; of the others, each face has one at least.
+void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const {
+  for (std::int32_t c = first; c < last; ++c) {
+    const bool has_cut_links = level_.size_log2[c] == 0 && level_.links_of(c).size() < 6;
+    const std::array<std::int32_t, 8>& slots = level_.slots[c];
+    std::uint8_t beside = 255;
+    for (const std::int32_t v : slots) beside &= beside_[v];
+    if (beside != 0 && !has_cut_links) continue;
+    Box3 box;
+    for (const std::int32_t v : slots) box.add(position(v));
+    if (reach_.may_meet(box, has_cut_links)) out.cells.push_back(c);
+  }
+}
+
+NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
+                     const BladeReach& reach) {
+  FindNear find(hierarchy, displacement, reach);
+  NearCells out;
+  find.look_at_vertices(0, hierarchy.levels[0].vertices(), out);
+  find.look_at_cells(0, hierarchy.levels[0].cells(), out);
   return out;
 }
 

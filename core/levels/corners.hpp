@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/body/cut.hpp"
 #include "core/geometry/vec.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/levels/update.hpp"
@@ -27,15 +28,30 @@ struct NewVertices {
 };
 NewVertices new_vertices(const Level& level, const LevelChange& change);
 
-/// What a blade may meet of the deformed body.
+/// What a blade may meet of the deformed body; positions count from the origin of the lattice.
 struct NearCells {
   Box3 bounds;                      ///< of all vertices, m
   bool finite = true;               ///< whether all positions are
-  std::vector<std::int32_t> cells;  ///< ascending: all that may_meet finds
+  std::vector<std::int32_t> cells;  ///< ascending: all that may be met, and few others
 };
-/// Looks at the cells in [first, last) and at their vertices. `reach` is that of the blade, and
-/// positions count from the origin of the lattice.
+/// In two passes, each of which may be shared out: over vertices, then over cells.
+class FindNear {
+ public:
+  FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
+           const BladeReach& reach);
+  void look_at_vertices(std::int32_t first, std::int32_t last, NearCells& out);
+  void look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const;
+
+ private:
+  Vec3d position(std::int32_t vertex) const;
+
+  const Level& level_;
+  double spacing_;
+  std::span<const double> displacement_;
+  const BladeReach& reach_;
+  std::vector<std::uint8_t> beside_;  // per vertex: a bit for each side of the box it lies beyond
+};
 NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
-                     const Box3& reach, std::int32_t first, std::int32_t last);
+                     const BladeReach& reach);
 
 }  // namespace kerf

@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "core/levels/colours.hpp"
 #include "core/solve/cycle.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/problem.hpp"
