@@ -544,8 +544,7 @@ Snapshot Simulation::snapshot() const {
 SurfaceMesh Simulation::surface_mesh() const {
   expects(!impl_->broken, "surface_mesh: not during a step, nor after one that threw");
   if (!impl_->surface) return {};
-  return impl_->surface->mesh(impl_->positions, impl_->normals,
-                              impl_->structure->piece_of_cells());
+  return impl_->surface->mesh(impl_->positions, impl_->normals, impl_->structure->piece_of_cells());
 }
 
 std::uint64_t Simulation::state_hash() const {

@@ -55,8 +55,7 @@ std::vector<std::int32_t> Structure::hold_again(const LinkedOctree& body) {
   const std::vector<std::uint8_t> before = level.fixed;
   apply_supports(body.lattice(), setup_->supports, level, 0, held_);
   if (setup_->time.mode == TimeMode::statics) {
-    FrozenCrumbs now =
-        hold_crumbs(body.lattice(), labels_.by_first_cell(), labels_.count(), level);
+    FrozenCrumbs now = hold_crumbs(body.lattice(), labels_.by_first_cell(), labels_.count(), level);
     if (now.pieces > crumbs_.pieces) warnings_.push_back(now.warning);
     crumbs_ = std::move(now);
   }

@@ -256,8 +256,7 @@ void CpuBackend::prepare(int level) {
   const Level& l = *store.level;
   parallel(store.vertices(), [&](std::int32_t v) {
     Sym sum{};
-    for (const std::int32_t k : l.incidences_of(v))
-      sum += cpu::diagonal_block(store, k / 8, k % 8);
+    for (const std::int32_t k : l.incidences_of(v)) sum += cpu::diagonal_block(store, k / 8, k % 8);
     const std::uint8_t fixed = l.fixed[v];
     if (fixed & 1) sum.xx = sum.xy = sum.xz = 0;
     if (fixed & 2) sum.yy = sum.xy = sum.yz = 0;
@@ -384,8 +383,7 @@ void CpuBackend::gauss_seidel(LevelStore& store, int level, SweepOrder order) {
     parallel(colours.begin[colour + 1] - begin, [&](std::int32_t i) {
       const std::int32_t v = colours.order[begin + i];
       Vec r = cpu::load(f, v);
-      for (const std::int32_t k : l.incidences_of(v))
-        r -= cpu::cell_row(store, k / 8, k % 8, u);
+      for (const std::int32_t k : l.incidences_of(v)) r -= cpu::cell_row(store, k / 8, k % 8, u);
       const Vec at = cpu::load(u, v);
       cpu::store(u, v, kernels::relax_vertex(at, r, store.inverse_diagonal[v], smoother_.omega));
     });

@@ -279,8 +279,8 @@ class LinkSearch {
 
   const LinkedOctree& body_;
   Quantiser quantiser_;
-  double reach_;                     // of the parts of a triangle that are searched at a time, m
-  double margin_;                    // covers the rounding of every box, m
+  double reach_;   // of the parts of a triangle that are searched at a time, m
+  double margin_;  // covers the rounding of every box, m
   std::vector<BladeTriangle> triangles_;
   std::vector<Box3> boxes_;          // of the leaves near the blade
   std::vector<std::uint8_t> masks_;  // and which links of theirs were cut before
@@ -364,9 +364,8 @@ bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
 }
 
 /// What the blade pass of `leaves` does to the body. Needs  a blade with triangles.
-CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box,
-                    std::span<const std::int32_t> numbers, std::span<const Vec3d> corners,
-                    const TriangleMesh& blade, CutEvent event) {
+CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box, std::span<const std::int32_t> numbers,
+                    std::span<const Vec3d> corners, const TriangleMesh& blade, CutEvent event) {
   LinkSearch search(body, numbers, corners, body_box, blade, bounds_of(blade));
   search.run();
   const std::vector<Hit> hits = search.take_hits();
@@ -379,7 +378,8 @@ CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box,
     while (end < hits.size() && hits[end].key == key) ++end;
     const Vec3i lower = lattice.link_lower(key);
     const int axis = Lattice::link_axis(key);
-    const LinkCut* before = body.record(lower, axis);
+    // The bit is cheaper to look up than that there is no record.
+    const LinkCut* before = body.connected(lower, axis) ? nullptr : body.record(lower, axis);
     const LinkCut record =
         nearest({hits.data() + begin, end - begin}, lattice.spacing, event.cut_id, before);
     ++event.links_hit;
@@ -445,13 +445,13 @@ bool BladeReach::may_meet(Box3 leaf, bool has_cut_links) const {
   }
   if (!leaf.overlaps(box_)) return false;
   return slabs_.empty() || std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& slab) {
-    if (!leaf.overlaps(slab.box)) return false;
-    const Vec3d to_center = 0.5 * leaf.lo + 0.5 * leaf.hi - slab.point;
-    double reach = margin_;
-    for (int d = 0; d < 3; ++d)
-      reach += 0.5001 * std::abs(slab.normal[d]) * (leaf.hi[d] - leaf.lo[d]);
-    return std::abs(dot(slab.normal, to_center)) <= reach;
-  });
+           if (!leaf.overlaps(slab.box)) return false;
+           const Vec3d to_center = 0.5 * leaf.lo + 0.5 * leaf.hi - slab.point;
+           double reach = margin_;
+           for (int d = 0; d < 3; ++d)
+             reach += 0.5001 * std::abs(slab.normal[d]) * (leaf.hi[d] - leaf.lo[d]);
+           return std::abs(dot(slab.normal, to_center)) <= reach;
+         });
 }
 
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,

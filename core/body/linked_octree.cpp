@@ -282,7 +282,8 @@ void LinkedOctree::add_leaves_between(const Vec3i& low, const Vec3i& high,
                       node.corner[d] + (1 << node.size_log2) > low[d];
           if (!touches) continue;
           if (node.first_child < 0) numbers.push_back(leaf_number(i));
-          for (int k = 7; node.first_child >= 0 && k >= 0; --k) stack.push_back(node.first_child + k);
+          for (int k = 7; node.first_child >= 0 && k >= 0; --k)
+            stack.push_back(node.first_child + k);
         }
       }
 }

@@ -82,8 +82,8 @@ ExternalForce::ExternalForce(const Lattice& lattice, const std::vector<Load>& lo
   }
 }
 
-// What one load does to the wanted slots (a bit each) of one cell. A body force is spread evenly over
-// it, and reaches its corners in equal shares.
+// What one load does to the wanted slots (a bit each) of one cell. A body force is spread evenly
+// over it, and reaches its corners in equal shares.
 void ExternalForce::on_slots(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell,
                              unsigned wanted, Vec3d (&slots)[8]) const {
   const Level& level = hierarchy.levels[0];

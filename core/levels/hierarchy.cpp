@@ -167,8 +167,7 @@ void coarsen_supports(const Level& fine, Level& coarse) {
   std::fill(coarse.fixed.begin(), coarse.fixed.end(), std::uint8_t{7});
   for (std::int32_t c = 0; c < fine.cells(); ++c) {
     const std::int32_t parent = fine.parent[c];
-    const std::uint64_t takes =
-        transfer_pattern(fine.fold[c], fine.place[c], coarse.fold[parent]);
+    const std::uint64_t takes = transfer_pattern(fine.fold[c], fine.place[c], coarse.fold[parent]);
     for (int i = 0; i < 8; ++i) {
       const std::uint8_t fixed = fine.fixed[fine.slots[c][i]];
       if (fixed == 7) continue;
@@ -239,8 +238,7 @@ std::vector<CellLink> links_of(const Level& level) {
   std::vector<CellLink> out;
   for (std::int32_t a = 0; a < level.cells(); ++a)
     for (const std::int32_t item : level.links_of(a))
-      if ((item & 1) != 0)
-        out.push_back({a, item / 8, static_cast<std::uint8_t>(item % 8 / 2)});
+      if ((item & 1) != 0) out.push_back({a, item / 8, static_cast<std::uint8_t>(item % 8 / 2)});
   return out;
 }
 

@@ -23,9 +23,10 @@
 
 namespace kerf {
 
-/// Arrays grow in place when a blade passes, and numbers stay: nothing is ever merged, so a cell that
-/// is split or falls apart leaves its number to one of its parts, a vertex to one of its own, and the
-/// others are appended (update.hpp). The order of a build is therefore that of the start alone.
+/// Arrays grow in place when a blade passes, and numbers stay: nothing is ever merged, so a cell
+/// that is split or falls apart leaves its number to one of its parts, a vertex to one of its own,
+/// and the others are appended (update.hpp). The order of a build is therefore that of the start
+/// alone.
 struct Level {
   static constexpr std::uint8_t kPassed = 8;
 
@@ -41,7 +42,8 @@ struct Level {
   std::vector<Vec3i> point;         ///< finest lattice
   std::vector<std::uint8_t> fixed;  ///< bit c: component c is held
 
-  // Lists, to be read by the functions below: these arrays lie packed only after a build and pack().
+  // Lists, to be read by the functions below: these arrays lie packed only after a build and
+  // pack().
   std::vector<std::int32_t> link_begin, linked;
   std::vector<std::int32_t> child_begin, children;  ///< empty on level 0
   std::vector<std::int32_t> incidence_begin, incidence;

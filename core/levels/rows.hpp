@@ -80,11 +80,14 @@ class Rows {
     ++state_.count[r];
   }
 
-  /// From an ascending row that has it.
-  void remove(std::int32_t r, std::int32_t item) {
+  /// From an ascending row. Returns whether it was there.
+  bool remove(std::int32_t r, std::int32_t item) {
     const auto first = items_.begin() + begin_[r], last = first + state_.count[r];
-    std::copy(std::lower_bound(first, last, item) + 1, last, std::lower_bound(first, last, item));
+    const auto place = std::lower_bound(first, last, item);
+    if (place == last || *place != item) return false;
+    std::copy(place + 1, last, place);
     --state_.count[r];
+    return true;
   }
 
   /// Back to packed.

@@ -44,15 +44,27 @@ Cells split_cells(const LinkedOctree& body, const CutEvent& event, Level& level,
     level.corner[cell] = node.corner;
     level.size_log2[cell] = node.size_log2;
   }
-  for (const LinkKey key : event.disconnected) {
-    Vec3i c = body.lattice().link_lower(key);
-    relink.push_back(body.leaf_number(body.leaf_at(c)));
-    ++c[static_cast<std::size_t>(Lattice::link_axis(key))];
-    relink.push_back(body.leaf_number(body.leaf_at(c)));
-  }
   relink.insert(relink.end(), touched.whole.begin(), touched.whole.end());
   sort_unique(relink);
   return relink;
+}
+
+// Takes the links that were cut, whose ends are finest cells, out of the lists that have them
+// still.
+void cut_links(const LinkedOctree& body, const CutEvent& event, Level& level,
+               std::vector<Touched::Faces>& relinked) {
+  Rows rows(level.link_begin, level.linked, level.link_rows);
+  for (const LinkKey key : event.disconnected) {
+    Vec3i c = body.lattice().link_lower(key);
+    const int axis = Lattice::link_axis(key);
+    const std::int32_t a = body.leaf_number(body.leaf_at(c));
+    ++c[static_cast<std::size_t>(axis)];
+    const std::int32_t b = body.leaf_number(body.leaf_at(c));
+    if (rows.remove(a, 8 * b + 2 * axis + 1))
+      relinked.push_back({a, static_cast<std::uint8_t>(2 << (2 * axis))});
+    if (rows.remove(b, 8 * a + 2 * axis))
+      relinked.push_back({b, static_cast<std::uint8_t>(1 << (2 * axis))});
+  }
 }
 
 // One coarse cell whose children changed: which of them still hold together?
@@ -174,21 +186,29 @@ class Regroup {
   std::vector<std::size_t> first_;
 };
 
-// Coarse cells whose children are other ones, or linked otherwise; and the new fine cells in each.
+// Coarse cells that may fall apart, coarse cells whose links may change, and the new fine cells in
+// each of the former.
 struct Blocks {
-  Cells cells;                                              // ascending
+  Cells inward, outward;                                     // ascending
   std::vector<std::pair<std::int32_t, std::int32_t>> fresh;  // (coarse cell, new child), ascending
 };
 
-Blocks touched_blocks(Level& fine, const ChangeLog& fine_log, const Touched& from) {
+Blocks touched_blocks(Level& fine, const ChangeLog& fine_log, const Touched& from, int log2) {
   Blocks out;
   for (const std::int32_t c : from.whole) {
     const std::int32_t parent = fine.parent[fine_log.origin(c)];
-    out.cells.push_back(parent);
+    out.inward.push_back(parent);
+    out.outward.push_back(parent);
     if (fine_log.is_new(c)) out.fresh.emplace_back(parent, c);
   }
-  for (const Touched::Faces& t : from.relinked) out.cells.push_back(fine.parent[t.cell]);
-  sort_unique(out.cells);
+  for (const Touched::Faces& t : from.relinked) {
+    int leave = 0;  // faces on the surface of the block
+    for (int d = 0; d < 3; ++d) leave |= 1 << (2 * d + ((fine.corner[t.cell][d] >> log2) & 1));
+    if (fine.size_log2[t.cell] != log2) leave = 63;
+    if ((t.faces & leave) != 0) out.outward.push_back(fine.parent[t.cell]);
+    if ((t.faces & ~leave) != 0) out.inward.push_back(fine.parent[t.cell]);
+  }
+  sort_unique(out.inward);
   std::sort(out.fresh.begin(), out.fresh.end());
   fine.parent.resize(fine.corner.size(), -1);
   fine.place.resize(fine.corner.size(), 0);
@@ -211,17 +231,35 @@ std::uint8_t coarse_fixed(const Level& fine, const Level& coarse, std::int32_t v
   return fixed;
 }
 
+// Whether some cell of the change has or had a hanging corner.
+bool has_hanging(const Level& level, const ChangeLog& log) {
+  const auto hangs = [](std::uint16_t fold) { return (fold & 255) != 0; };
+  for (const CellBefore& was : log.change().before)
+    if (hangs(was.fold)) return true;
+  for (const std::int32_t cell : log.change().cells)
+    if (hangs(level.fold[cell])) return true;
+  return std::any_of(level.fold.begin() + log.change().cells_before, level.fold.end(), hangs);
+}
+
 // Supports of the coarse vertices that may be held otherwise now; returns the old ones that are.
-// `held`: old fine vertices that are held otherwise.
-Cells update_fixed(const Level& fine, Level& coarse, ChangeLog& log, const Cells& held) {
+// `apart`: coarse cells that are new or gave parts to new ones; `held`: old fine vertices that are
+// held otherwise.
+Cells update_fixed(const Level& fine, const ChangeLog& fine_log, Level& coarse, ChangeLog& log,
+                   const Cells& apart, const Cells& held) {
   Cells vertices = log.change().vertices;
-  const auto add = [&](std::int32_t cell) {
-    vertices.insert(vertices.end(), coarse.slots[cell].begin(), coarse.slots[cell].end());
+  // Where nothing hangs, no child went and no new vertex is held, a coarse vertex takes from more
+  // places than before or from copies of the same, and what was free stays free.
+  const bool look_at_all = has_hanging(fine, fine_log) || has_hanging(coarse, log) ||
+                           std::any_of(fine.fixed.begin() + fine_log.change().vertices_before,
+                                       fine.fixed.end(), [](std::uint8_t f) { return f != 0; });
+  const auto add = [&](std::int32_t cell, bool all) {
+    for (const std::int32_t v : coarse.slots[cell])
+      if (all || coarse.fixed[v] != 0) vertices.push_back(v);
   };
-  for (const std::int32_t cell : log.change().cells) add(cell);
-  for (std::int32_t c = log.change().cells_before; c < coarse.cells(); ++c) add(c);
+  for (const std::int32_t cell : log.change().cells) add(cell, look_at_all);
+  for (const std::int32_t cell : apart) add(cell, true);
   for (const std::int32_t v : held)
-    for (const std::int32_t k : fine.incidences_of(v)) add(fine.parent[k / 8]);
+    for (const std::int32_t k : fine.incidences_of(v)) add(fine.parent[k / 8], true);
   sort_unique(vertices);
   Cells changed;
   for (const std::int32_t v : vertices) {
@@ -255,23 +293,25 @@ void LevelUpdater::update_finest(const LinkedOctree& body, const CutEvent& event
       level, relink, logs_[0],
       [&](std::int32_t cell, Cells& row) { add_links_of_leaf(body, cell, row); },
       touched_.relinked);
+  cut_links(body, event, level, touched_.relinked);
   update_vertices(level, touched_, logs_[0]);
 }
 
 void LevelUpdater::coarsen(Hierarchy& hierarchy, std::size_t index) {
   Level &fine = hierarchy.levels[index], &coarse = hierarchy.levels[index + 1];
   ChangeLog &fine_log = logs_[index], &log = logs_[index + 1];
-  const Blocks blocks = touched_blocks(fine, fine_log, touched_);
+  const Blocks blocks = touched_blocks(fine, fine_log, touched_, static_cast<int>(index));
   Touched touched;
-  Cells relink = blocks.cells, fresh;
+  Cells relink = blocks.outward, fresh;
   Regroup regroup(fine, fine_log, coarse, log, static_cast<int>(index));
   std::size_t at = 0;
-  for (const std::int32_t cell : blocks.cells) {
+  for (const std::int32_t cell : blocks.inward) {
     fresh.clear();
     for (; at < blocks.fresh.size() && blocks.fresh[at].first == cell; ++at)
       fresh.push_back(blocks.fresh[at].second);
     if (!regroup(cell, fresh)) continue;
     touched.whole.push_back(cell);
+    relink.push_back(cell);
     add_linked(coarse, cell, relink);
   }
   regroup.finish();
@@ -301,7 +341,8 @@ bool LevelUpdater::update_coarse(Hierarchy& hierarchy, const HierarchyOptions& o
   const std::size_t levels = options.duplicate_cells ? hierarchy.levels.size() : 1;
   for (std::size_t l = 0; l + 1 < levels; ++l) {
     coarsen(hierarchy, l);
-    held = update_fixed(hierarchy.levels[l], hierarchy.levels[l + 1], logs_[l + 1], held);
+    held = update_fixed(hierarchy.levels[l], logs_[l], hierarchy.levels[l + 1], logs_[l + 1],
+                        touched_.whole, held);
   }
   logs_[levels - 1].finish();
   logs_.clear();

@@ -10,8 +10,8 @@
 // The result equals a build from nothing up to the order of new cells and vertices.
 //
 // What a blade can change about a vertex, it changes around the corners of cells that are new, fell
-// apart, or have other links: of old links (a, b) around a grid point, one was disconnected, or a or
-// b has another number now. So only the components of cells around these corners are looked at.
+// apart, or have other links: of old links (a, b) around a grid point, one was disconnected, or a
+// or b has another number now. So only the components of cells around these corners are looked at.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct Touched {
     std::uint8_t faces;  ///< bit per face
   };
   std::vector<std::int32_t> whole;  ///< ascending: cells that are new or gave parts to new ones
-  std::vector<Faces> relinked;      ///< ascending: old cells whose links through these faces changed
+  std::vector<Faces> relinked;      ///< old cells whose links through these faces changed
 };
 
 /// All zero between updates; one entry a cell.
@@ -53,7 +53,7 @@ struct LevelChange {
   /// Ascending: new cells; those with another corner, size, fold, slot, parent, place or child; and
   /// the parents of all these.
   std::vector<std::int32_t> cells;
-  std::vector<CellBefore> before;    ///< the first of `cells`, those below cells_before, as they were
+  std::vector<CellBefore> before;  ///< the first of `cells`, those below cells_before, as they were
   std::vector<std::int32_t> origin;  ///< of each new cell: the old one that it was a part of
   /// Ascending: new vertices, and those with another incidence or held otherwise.
   std::vector<std::int32_t> vertices;

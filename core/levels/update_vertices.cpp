@@ -38,8 +38,9 @@ Vec3i corner_point(const Level& level, std::int32_t cell, int corner) {
 class VertexUpdate {
  public:
   VertexUpdate(Level& level, ChangeLog& log)
-      : level_(level), log_(log), rows_(level.incidence_begin, level.incidence,
-                                        level.incidence_rows) {}
+      : level_(level),
+        log_(log),
+        rows_(level.incidence_begin, level.incidence, level.incidence_rows) {}
 
   void run(const Touched& touched) {
     for (const std::int32_t cell : touched.whole) {
@@ -67,9 +68,9 @@ class VertexUpdate {
   // Cells that a chain of links joins around a grid point.
   struct Component {
     Vec3i point;
-    std::int32_t begin, end;      // of members_
-    std::int32_t master = -1;     // a larger cell: then the corners of the others hang
-    std::int32_t vertex = -1;     // the old one; then the one that it gets
+    std::int32_t begin, end;       // of members_
+    std::int32_t master = -1;      // a larger cell: then the corners of the others hang
+    std::int32_t vertex = -1;      // the old one; then the one that it gets
     std::int32_t first_place = 0;  // the least 8 cell + corner
   };
   struct Hanging {
@@ -129,7 +130,10 @@ class VertexUpdate {
 
   // The vertex that a corner had; -1 if it hung, or was none.
   std::int32_t old_vertex(const Member& m, const Vec3i& point) const {
-    const CellBefore was = log_.before(log_.origin(m.cell));
+    const std::int32_t origin = log_.origin(m.cell);
+    if (!log_.is_touched(origin))  // it fills the same cube still
+      return (level_.fold[origin] >> m.corner & 1) != 0 ? -1 : level_.slots[origin][m.corner];
+    const CellBefore was = log_.before(origin);
     const int corner = corner_at(was.corner, was.size_log2, point);
     return corner < 0 || (was.fold >> corner & 1) != 0 ? -1 : was.slots[corner];
   }
@@ -264,9 +268,8 @@ std::int32_t ChangeLog::append_cell(std::int32_t origin, const Vec3i& corner,
 void ChangeLog::finish() {
   std::vector<std::int32_t> order(change_.cells.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-    return change_.cells[a] < change_.cells[b];
-  });
+  std::sort(order.begin(), order.end(),
+            [&](std::int32_t a, std::int32_t b) { return change_.cells[a] < change_.cells[b]; });
   std::vector<std::int32_t> cells;
   std::vector<CellBefore> before;
   cells.reserve(order.size() + change_.origin.size());

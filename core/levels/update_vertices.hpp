@@ -34,7 +34,14 @@ class ChangeLog {
         {level_.corner[cell], level_.size_log2[cell], level_.fold[cell], level_.slots[cell]});
     scratch_.listed[cell] = static_cast<std::int32_t>(change_.cells.size());
   }
-  void touch_vertex(std::int32_t vertex) { change_.vertices.push_back(vertex); }
+  void touch_vertex(std::int32_t vertex) {
+    std::vector<std::int32_t>& all = change_.vertices;
+    // Most are touched several times in a row, two by turns.
+    const std::size_t n = all.size();
+    if (n > 1 && (all[n - 1] == vertex || all[n - 2] == vertex)) return;
+    all.push_back(vertex);
+  }
+  bool is_touched(std::int32_t old_cell) const { return scratch_.listed[old_cell] != 0; }
   /// An old cell as it was.
   CellBefore before(std::int32_t cell) const {
     const std::int32_t at = scratch_.listed[cell];

@@ -227,8 +227,7 @@ void build_vertices(Level& level) {
   expects(places.count() < (std::size_t{1} << 31),
           "the body has too many cells for 32-bit indices; lower the resolution");
   UnionFind sets(places.count());
-  for_each_link(level,
-                [&](const CellLink& link) { unite_over_link(level, places, link, sets); });
+  for_each_link(level, [&](const CellLink& link) { unite_over_link(level, places, link, sets); });
   const std::vector<Component> component = number_vertices(level, places, sets);
   fill_slots(level, places, sets, component);
   check_masters(level, places, sets, component);

@@ -42,7 +42,8 @@ class Surface {
   void update(const LinkedOctree& body, const CutEvent& event);
   /// Finds the cells of level 0, by their place in body.leaves(), that vertices move with. A vertex
   /// belongs to the nearest finest cell of its own component, and moves with the leaf around it.
-  /// Looks only at vertices that changed since the last call, and at those in leaves that were split.
+  /// Looks only at vertices that changed since the last call, and at those in leaves that were
+  /// split.
   void bind(const LinkedOctree& body);
 
   const TriangleStore& store() const { return store_; }
