@@ -440,7 +440,7 @@ BladeReach::BladeReach(const TriangleMesh& blade, const Vec3d& origin) {
 
 bool BladeReach::may_meet(Box3 leaf, bool has_cut_links) const {
   if (has_cut_links) {
-    const Vec3d beyond = 0.51 * leaf.extent();  // a little more, for rounding
+    const Vec3d beyond = kBeyond * leaf.extent();
     leaf = {leaf.lo - beyond, leaf.hi + beyond};
   }
   if (!leaf.overlaps(box_)) return false;

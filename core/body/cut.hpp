@@ -41,12 +41,15 @@ struct DeformedLeaves {
 /// Where a blade may meet something, rounding included: a quick test that errs on the safe side.
 class BladeReach {
  public:
+  /// How far links that were cut before may reach beyond their leaf, in its extents; a little more,
+  /// for rounding.
+  static constexpr double kBeyond = 0.51;
+
   /// Positions that are tested count from `origin`.
   explicit BladeReach(const TriangleMesh& blade, const Vec3d& origin = {});
 
   const Box3& box() const { return box_; }
-  /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met. Those that were
-  /// cut before may reach beyond their leaf, by half of its extent.
+  /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met.
   bool may_meet(Box3 leaf, bool has_cut_links) const;
 
  private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/levels/corners.hpp"
 
+#include <bit>
 #include <cmath>
 
 #include "core/base/error.hpp"
@@ -102,6 +103,21 @@ void FindNear::look_at_vertices(std::int32_t first, std::int32_t last, NearCells
   out.finite = out.finite && std::isfinite(sum);
 }
 
+// Whether links of a cell whose vertices all lie beyond one side of the box end there too.
+bool FindNear::is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const {
+  const int side = std::countr_zero(beside), d = side / 2;
+  Box3 along;
+  for (const std::int32_t v : slots) {
+    const double x = level_.point[v][static_cast<std::size_t>(d)] * spacing_ +
+                     displacement_[3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(d)];
+    along.lo.x = std::min(along.lo.x, x);
+    along.hi.x = std::max(along.hi.x, x);
+  }
+  const double beyond = BladeReach::kBeyond * (along.hi.x - along.lo.x);
+  return side % 2 == 0 ? along.hi.x + beyond < reach_.box().lo[d]
+                       : along.lo.x - beyond > reach_.box().hi[d];
+}
+
 // Only finest cells have links that were cut; of the others, each face has one at least.
 void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const {
   for (std::int32_t c = first; c < last; ++c) {
@@ -109,7 +125,7 @@ void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& o
     const std::array<std::int32_t, 8>& slots = level_.slots[c];
     std::uint8_t beside = 255;
     for (const std::int32_t v : slots) beside &= beside_[v];
-    if (beside != 0 && !has_cut_links) continue;
+    if (beside != 0 && (!has_cut_links || is_far(slots, beside))) continue;
     Box3 box;
     for (const std::int32_t v : slots) box.add(position(v));
     if (reach_.may_meet(box, has_cut_links)) out.cells.push_back(c);

@@ -3,6 +3,8 @@
 // From vertex values to corner values and back, on the host, for level 0.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -44,6 +46,7 @@ class FindNear {
 
  private:
   Vec3d position(std::int32_t vertex) const;
+  bool is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const;
 
   const Level& level_;
   double spacing_;

@@ -98,23 +98,22 @@ class VertexUpdate {
     c.first_place = 8 * cell + corner;
     members_.push_back({cell, corner});
     for (std::size_t i = static_cast<std::size_t>(c.begin); i < members_.size(); ++i)
-      add_neighbours(members_[i].cell, c);
+      add_neighbours(Member(members_[i]), c);
     c.end = static_cast<std::int32_t>(members_.size());
     components_.push_back(c);
   }
 
-  void add_neighbours(std::int32_t cell, Component& c) {
-    const Vec3i low = level_.corner[cell];
-    const int size = 1 << level_.size_log2[cell];
-    int faces = 0;
-    for (int d = 0; d < 3; ++d) {
-      if (c.point[d] == low[d]) faces |= 1 << (2 * d);
-      if (c.point[d] == low[d] + size) faces |= 2 << (2 * d);
-    }
-    for (const std::int32_t item : level_.links_of(cell)) {
+  void add_neighbours(const Member& member, Component& c) {
+    const std::uint8_t size_log2 = level_.size_log2[member.cell];
+    const int faces =
+        member.corner >= 0 ? faces_of_corner(member.corner) : faces_of_point(member.cell, c.point);
+    for (const std::int32_t item : level_.links_of(member.cell)) {
       if ((faces >> (item % 8) & 1) == 0) continue;
       const std::int32_t other = item / 8;
-      const int corner = corner_at(level_.corner[other], level_.size_log2[other], c.point);
+      // Across a face between cells of one size a corner is the mirrored one.
+      const int corner = member.corner >= 0 && level_.size_log2[other] == size_log2
+                             ? member.corner ^ 1 << (item % 8 / 2)
+                             : corner_at(level_.corner[other], level_.size_log2[other], c.point);
       if (corner == kApart) continue;
       if (corner == kBetween) {
         const auto known = [other](const Member& m) { return m.cell == other; };
@@ -126,6 +125,14 @@ class VertexUpdate {
       }
       members_.push_back({other, corner});
     }
+  }
+  int faces_of_point(std::int32_t cell, const Vec3i& p) const {
+    int faces = 0;
+    for (int d = 0; d < 3; ++d) {
+      if (p[d] == level_.corner[cell][d]) faces |= 1 << (2 * d);
+      if (p[d] == level_.corner[cell][d] + (1 << level_.size_log2[cell])) faces |= 2 << (2 * d);
+    }
+    return faces;
   }
 
   // The vertex that a corner had; -1 if it hung, or was none.

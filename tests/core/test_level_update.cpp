@@ -10,10 +10,11 @@
 #include "core/body/cut.hpp"
 #include "core/body/pieces.hpp"
 #include "core/fem/loads.hpp"
+#include "core/levels/corners.hpp"
 #include "core/levels/piece_labels.hpp"
 #include "core/levels/update.hpp"
+#include "core/snapshot.hpp"
 #include "core/surface/surface.hpp"
-#include "tests/support/cut_oracle.hpp"
 #include "tests/support/level_match.hpp"
 #include "tests/support/random_blades.hpp"
 #include "tests/support/scenes.hpp"
@@ -67,15 +68,47 @@ std::vector<std::int32_t> freeze_piece(const LinkedOctree& body, Level& level,
   return {held.begin(), held.end()};
 }
 
-/// Corners of the leaves after a bend and a shake that opens cracks between them.
-std::vector<Vec3d> deformed_corners(const LinkedOctree& body, test::Dice& dice) {
+/// A bend, and a shake that is different at every vertex.
+std::vector<double> random_displacement(const LinkedOctree& body, const Level& level,
+                                        test::Dice& dice) {
   const Lattice& lattice = body.lattice();
   const double bend = dice.between(-0.5, 0.5) / lattice.spacing / 14;
-  const double shake = dice.roll(3) == 0 ? 0.2 * lattice.spacing : 0;
-  return test::corners_of(body, [&](const Vec3d& x) {
-    const Vec3d r = x - lattice.origin;
-    return x + Vec3d{0, bend * r.x * r.x, 0} + shake * dice.direction();
-  });
+  const double shake = dice.roll(3) == 0 ? 0.4 * lattice.spacing : 0;
+  std::vector<double> out;
+  for (const Vec3i& p : level.point) {
+    const Vec3d r = lattice.point(p) - lattice.origin;
+    const Vec3d u = Vec3d{0.3 * r.z, bend * r.x * r.x, 0} + shake * dice.direction();
+    out.insert(out.end(), {u.x, u.y, u.z});
+  }
+  return out;
+}
+
+/// Cuts `body` in a deformed state, from the leaves near the blade, as from all leaves.
+CutEvent cut_deformed(LinkedOctree& body, Hierarchy& levels, const TriangleMesh& blade,
+                      std::int32_t id, test::Dice& dice) {
+  const Level& level = levels.levels[0];
+  const Vec3d origin = body.lattice().origin;
+  levels.spacing = body.lattice().spacing;
+  const std::vector<double> u = random_displacement(body, level, dice);
+  const NearCells near = near_cells(levels, u, BladeReach(blade, origin));
+  std::vector<double> of_slots;
+  for (const std::int32_t c : near.cells)
+    for (const std::int32_t v : level.slots[c])
+      for (std::size_t d = 0; d < 3; ++d)
+        of_slots.push_back(u[3 * static_cast<std::size_t>(v) + d]);
+  LinkedOctree other = body;
+  const CutEvent all = cut(other, cell_corners(body.lattice(), level, u), blade, id);
+  const CutEvent event = cut_near(body,
+                                  {{near.bounds.lo + origin, near.bounds.hi + origin},
+                                   near.cells,
+                                   corners_of_cells(body.lattice(), level, near.cells, of_slots)},
+                                  blade, id);
+  EXPECT_TRUE(near.finite);
+  EXPECT_EQ(event.disconnected, all.disconnected);
+  EXPECT_EQ(event.moved, all.moved);
+  EXPECT_EQ(event.split, all.split);
+  EXPECT_EQ(event.links_hit, all.links_hit);
+  return event;
 }
 
 /// Every vertex of the surface moves with the leaf around its finest cell.
@@ -145,9 +178,10 @@ void cut_one_body(std::uint64_t seed, int blades, Counts& counts) {
   surface.bind(body);
   for (int i = 0; i < blades; ++i) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ", blade " << i);
-    std::vector<Vec3d> corners;
-    if (dice.roll(3) == 0) corners = deformed_corners(body, dice);
-    const CutEvent event = cut(body, corners, random.next(), i + 1);
+    const TriangleMesh blade = random.next();
+    const CutEvent event = dice.roll(2) == 0 ? cut_deformed(body, levels, blade, i + 1, dice)
+                                             : cut(body, {}, blade, i + 1);
+    ASSERT_FALSE(::testing::Test::HasFailure());
     const Hierarchy before = levels;
 
     updater.update_finest(body, event, levels);

@@ -262,14 +262,14 @@ TEST(LevelsByHand, SlabWithAnL) {
   EXPECT_EQ(h.levels[1].corner[1], h.levels[1].corner[2]);  // B and B' share their place
   EXPECT_EQ(h.levels[2].corner[0], h.levels[2].corner[1]);
   EXPECT_EQ(link_list(h.levels[1]), (Links{{0, 1, 0},     // A-B  over 1-2
-                                          {0, 4, 1},     // A-D
-                                          {1, 3, 0},     // B-C  over 3-4
-                                          {1, 5, 1},     // B-E  over 8-14
-                                          {2, 3, 0},     // B'-C over 9-10
-                                          {2, 6, 1},     // B'-E' over 9-15
-                                          {3, 7, 1},     // C-F
-                                          {4, 5, 0},     // D-E
-                                          {6, 7, 0}}));  // E'-F over 15-16; E has no link to E', F
+                                           {0, 4, 1},     // A-D
+                                           {1, 3, 0},     // B-C  over 3-4
+                                           {1, 5, 1},     // B-E  over 8-14
+                                           {2, 3, 0},     // B'-C over 9-10
+                                           {2, 6, 1},     // B'-E' over 9-15
+                                           {3, 7, 1},     // C-F
+                                           {4, 5, 0},     // D-E
+                                           {6, 7, 0}}));  // E'-F over 15-16; E has no link to E', F
   EXPECT_EQ(link_list(h.levels[2]), (Links{{0, 2, 0}, {1, 2, 0}}));
   EXPECT_TRUE(link_list(h.levels[3]).empty());
 

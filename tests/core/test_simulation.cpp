@@ -181,8 +181,7 @@ TEST(Simulation, UpdatesAndLoadsGiveTheSameBits) {
       setup.time.mode = mode;
       setup.time.scheme = refinement == 1 ? TimeScheme::central : TimeScheme::newmark;
       setup.loads.push_back(BoxForce{{{0.4, 0.4, 0.1}, {0.6, 0.7, 0.4}}, {1, 2, 3}});
-      setup.supports.push_back(
-          {{{-9, 0.99, -9}, {0.3, 9, 9}}, {0.01, 0, 0}, {true, false, false}});
+      setup.supports.push_back({{{-9, 0.99, -9}, {0.3, 9, 9}}, {0.01, 0, 0}, {true, false, false}});
       setup.regions = {{make_box({{0.3, 0.2, 0}, {0.7, 0.6, 0.3}}), {1e5, 0.3, 500, 0, 0}}};
       setup.solver.coarsest_vertices = 30;
       CutSetup crumb;  // off an upper corner, which statics holds where it is
