@@ -56,7 +56,8 @@ Hierarchy Body::build_levels(const LinkedOctree& octree) const {
     out.values.push_back(
         {setup_.material.young * side, setup_.material.density * side * side * side, 0});
   }
-  apply_supports(octree.lattice(), setup_.supports, level);
+  std::vector<double> held;
+  apply_supports(octree.lattice(), setup_.supports, level, 0, held);
   std::size_t pieces = 0;
   const std::vector<std::int32_t> piece = label_pieces(octree, &pieces);
   hold_crumbs(octree.lattice(), piece, pieces, level);
@@ -69,7 +70,7 @@ Hierarchy Body::build_levels(const LinkedOctree& octree) const {
 
 void Body::build() {
   hierarchy_ = build_levels(octree_);
-  load_ = external_force(octree_.lattice(), setup_.loads, hierarchy_);
+  load_ = ExternalForce(octree_.lattice(), setup_.loads, finest()).on_all(hierarchy_);
   bent_corners_ = cell_corners(octree_.lattice(), finest(), bent(1));
   place_blade();
 }
@@ -127,7 +128,6 @@ std::uint64_t hash_of(const Hierarchy& hierarchy) {
     hash.add(level.slots);
     hash.add(level.fixed);
     hash.add(level.incidence);
-    hash.add(level.colour_order);
   }
   return hash.value();
 }

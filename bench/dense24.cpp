@@ -58,8 +58,7 @@ void Dense24::apply(std::span<const double> in, std::span<double> out) {
 #pragma omp parallel for num_threads(threads_) schedule(static)
   for (std::int32_t v = 0; v < vertices; ++v) {
     Vec3d sum{};
-    for (std::int32_t k = level.incidence_begin[v]; k < level.incidence_begin[v + 1]; ++k)
-      sum += products_[level.incidence[k]];
+    for (const std::int32_t k : level.incidences_of(v)) sum += products_[k];
     for (int c = 0; c < 3; ++c)
       out[3 * static_cast<std::size_t>(v) + c] = ((level.fixed[v] >> c) & 1) != 0 ? 0 : sum[c];
   }

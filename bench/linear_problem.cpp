@@ -27,8 +27,9 @@ LinearProblem::LinearProblem(const ProblemSetup& setup) : setup_(setup) {
     const double side = lattice.spacing * (1 << log2);
     hierarchy_.values.push_back({side, side * side * side, 0});
   }
+  std::vector<double> held;
   apply_supports(lattice, {{{{-1, -1e-9, -1}, {2, 1e-9, 2}}, {}, {true, true, true}}},
-                 hierarchy_.levels[0]);
+                 hierarchy_.levels[0], 0, held);
   build_coarse_levels(hierarchy_, {setup.solver.coarsest_vertices, setup.solver.max_levels,
                                    setup.solver.duplicate_cells});
 
@@ -44,7 +45,8 @@ LinearProblem::LinearProblem(const ProblemSetup& setup) : setup_(setup) {
     scale.mass = 4 / (dt * dt);  // Newmark, beta 1/4
   }
   backend_->set_operator(scale);
-  backend_->write(0, b_, external_force(lattice, {Gravity{{0.3, -1, 0.2}}}, hierarchy_));
+  const ExternalForce load(lattice, {Gravity{{0.3, -1, 0.2}}}, hierarchy_.levels[0]);
+  backend_->write(0, b_, load.on_all(hierarchy_));
   backend_->mask(0, b_);
   solver_->set_structure(hierarchy_);
   solver_->refresh();

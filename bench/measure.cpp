@@ -257,6 +257,8 @@ void SceneRun::measure(const Phase& phase) {
     entrant.trial->machine.load();
     entrant.trial->hierarchy.reset();
     entrant.trial->previous.reset();
+    entrant.trial->structure.reset();
+    entrant.trial->structure_before.reset();
   }
 }
 

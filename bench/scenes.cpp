@@ -72,6 +72,7 @@ struct Sizes {
 const std::vector<SceneInfo>& scenes() {
   static const std::vector<SceneInfo> all{
       {"box64", "uncut cube, 64^3 cells, nu 0.3"},
+      {"box100", "uncut cube, 100^3 cells: a million cells"},
       {"box128", "uncut cube, 128^3 cells, nu 0.3"},
       {"box192", "uncut cube, 192^3 cells, nu 0.3"},
       {"bunny", "Stanford bunny, 96 uniform cells long"},
@@ -94,6 +95,7 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
   const MeshScene armadillo{"armadillo.toml", "armadillo.obj", 128, 40};
   std::optional<SimulationSetup> out;
   if (name == "box64") out = cube(Sizes{64, 6}.of(size));
+  if (name == "box100") out = cube(Sizes{100, 7}.of(size));
   if (name == "box128") out = cube(Sizes{128, 8}.of(size));
   if (name == "box192" || name == "box7m") out = cube(Sizes{192, 12}.of(size));
   if (name == "box1m-unknowns") out = cube(Sizes{69, 9}.of(size));

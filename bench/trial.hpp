@@ -14,6 +14,7 @@
 #include "bench/dense24.hpp"
 #include "core/backend.hpp"
 #include "core/solve/linear_solver.hpp"
+#include "core/structure.hpp"
 #include "core/surface/surface.hpp"
 
 namespace kerf::bench {
@@ -63,6 +64,10 @@ struct Trial {
   std::optional<LinkedOctree> octree;
   std::unique_ptr<Surface> surface;
   std::unique_ptr<Hierarchy> hierarchy, previous;  // built by a phase, loaded into the backend
+  std::unique_ptr<Structure> structure, structure_before;  // the same
+  std::vector<double> bent_values;
+  CutEvent event;
+  bool in_place = false;  // the last blade changed the coarse levels in place
 
   Backend& backend() { return machine.backend(); }
   /// Frees what a phase kept.

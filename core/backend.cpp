@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "core/backend.hpp"
 
+#include "core/base/error.hpp"
+
 namespace kerf {
+namespace {
+
+constexpr const char* kNoUpdates = "a backend without updates is asked for one";
+
+}  // namespace
 
 std::array<double, 2> Backend::dots(int x, int y, int z) { return {dot(0, x, y), dot(0, x, z)}; }
 
@@ -18,6 +25,21 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
   add(0, a, d, x);
   add(0, -a, q, r);
   return dot(0, r, r);
+}
+
+void Backend::update(const Hierarchy&, const HierarchyChange&) { ensures(false, kNoUpdates); }
+
+void Backend::write_some(int, int, std::span<const std::int32_t>, std::span<const double>) {
+  ensures(false, kNoUpdates);
+}
+
+void Backend::read_some(int, int, std::span<const std::int32_t>, std::span<double>) const {
+  ensures(false, kNoUpdates);
+}
+
+NearCells Backend::find_near(int, const BladeReach&) const {
+  ensures(false, kNoUpdates);
+  return {};
 }
 
 }  // namespace kerf

@@ -11,7 +11,9 @@
 #include <cstdint>
 #include <span>
 
+#include "core/levels/corners.hpp"
 #include "core/levels/hierarchy.hpp"
+#include "core/levels/update.hpp"
 #include "core/surface/surface_view.hpp"
 
 namespace kerf {
@@ -59,6 +61,9 @@ class Backend {
   /// Topology; again after each cut. Vectors and rotations are then zero and identity.
   /// The hierarchy must outlive the next load.
   virtual void load(const Hierarchy& hierarchy) = 0;
+  /// Whether the functions under "Updates" are there. Else the caller packs the hierarchy after a
+  /// cut (Hierarchy::pack), loads it, and writes all that it wants kept.
+  virtual bool can_update() const noexcept { return false; }
   virtual void set_smoother(const SmootherOptions& options) = 0;
   /// One more vector on level 0; stays through later loads.
   virtual int add_vector() = 0;
@@ -121,6 +126,20 @@ class Backend {
   virtual void mask(int level, int x) = 0;  ///< zero in fixed components
   virtual void write(int level, int x, std::span<const double> values) = 0;
   virtual void read(int level, int x, std::span<double> values) const = 0;
+
+  // Updates: what a cut costs follows what it touched.
+  /// The hierarchy that was loaded has changed in place, where `change` tells. Vectors keep what
+  /// they hold at old vertices and are zero at new ones; new cells have the rotation of their
+  /// origin. Between the change and this call, or a load, only read, read_some and read_rotations
+  /// are called, with the sizes and numbers of before.
+  virtual void update(const Hierarchy& hierarchy, const HierarchyChange& change);
+  /// Three values for each of some vertices.
+  virtual void write_some(int level, int x, std::span<const std::int32_t> vertices,
+                          std::span<const double> values);
+  virtual void read_some(int level, int x, std::span<const std::int32_t> vertices,
+                         std::span<double> values) const;
+  /// What a blade may meet: as near_cells in core/levels/corners.hpp.
+  virtual NearCells find_near(int displacement, const BladeReach& reach) const;
 };
 
 }  // namespace kerf

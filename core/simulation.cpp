@@ -2,21 +2,23 @@
 #include "core/simulation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/memory.hpp"
 #include "core/base/timer.hpp"
-#include "core/body/pieces.hpp"
 #include "core/cut_schedule.hpp"
 #include "core/fem/equilibrium.hpp"
-#include "core/fem/held.hpp"
-#include "core/fem/loads.hpp"
 #include "core/fem/motion.hpp"
 #include "core/levels/corners.hpp"
 #include "core/snapshot.hpp"
+#include "core/structure.hpp"
 #include "core/surface/surface.hpp"
 #include "kernels/mat3.hpp"
 
@@ -28,6 +30,20 @@ struct Clock {
   double voxelise = 0, cut = 0, structure = 0, load = 0, step = 0;
   double surface = 0, surface_bind = 0, surface_positions = 0, surface_normals = 0;
 };
+
+// What a backend that cannot update forgets.
+struct Kept {
+  std::vector<std::vector<double>> vectors;  // of the state
+  std::vector<double> rotations;
+};
+
+std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices) {
+  std::vector<double> out;
+  out.reserve(3 * vertices.size());
+  for (const std::int32_t v : vertices)
+    for (std::size_t d = 0; d < 3; ++d) out.push_back(all[3 * static_cast<std::size_t>(v) + d]);
+  return out;
+}
 
 std::vector<std::shared_ptr<const Solid>> solids_of(const std::vector<Region>& regions) {
   std::vector<std::shared_ptr<const Solid>> out;
@@ -61,13 +77,17 @@ struct Simulation::Impl {
   void build_structure();
   void warn_of_idle_supports();
   void load_structure();
+  void change_structure(const CutEvent& event);
+  void update_backend();
+  Kept read_state(std::int32_t vertices, std::int32_t cells) const;
+  void write_state(Kept kept);
   void bind_surface();
   void move_surface();
   void check_memory() const;
+  CutEvent make_cut(const DueCut& due);
   bool apply_cut(const DueCut& due, StepReport& report);
-  void transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
-                std::vector<std::vector<double>> values, const std::vector<double>& rotations);
-  std::vector<double> hold(std::vector<double> values, bool is_displacement) const;
+  DeformedLeaves leaves_near(const TriangleMesh& blade) const;
+  std::array<std::pair<int, bool>, 3> state_vectors() const;
   double natural_time() const;
   void copy_state(const StateVectors& from, const StateVectors& to);
   void step_back();
@@ -77,22 +97,19 @@ struct Simulation::Impl {
   StepReport step();
 
   SimulationSetup setup;
-  Clock clock;
+  mutable Clock clock;
   std::unique_ptr<Backend> backend;
   Voxels voxels;
   LinkedOctree body;
   CutSchedule schedule;
   LinearSolver solver;
-  Hierarchy hierarchy;
+  std::unique_ptr<Structure> structure;
   StateVectors state, before_step;
   std::unique_ptr<Motion> motion;
   std::unique_ptr<Equilibrium> equilibrium;
-  std::vector<double> held;  // displacement of held components
-  FrozenCrumbs crumbs;
   std::unique_ptr<Surface> surface;       // null: none asked for
   std::vector<Vec3d> positions, normals;  // of its slots, after the last step
-  std::vector<std::int32_t> piece;
-  std::size_t pieces = 0, cells_before = 0, hanging = 0, links_cut = 0;
+  std::size_t cells_before = 0, links_cut = 0;
   int steps = 0;
   bool stopped = false;
   bool broken = false;
@@ -100,6 +117,9 @@ struct Simulation::Impl {
   bool prescribed = false;  // some held displacement is not zero, and has not spread yet
   std::vector<std::string> warnings;
   Progress progress;
+
+  const Hierarchy& hierarchy() const { return structure->hierarchy(); }
+  const Level& finest() const { return structure->finest(); }
 };
 
 void Simulation::Impl::start() {
@@ -124,12 +144,13 @@ void Simulation::Impl::start() {
     surface = std::make_unique<Surface>(body, setup.surface);
   }
   bind_surface();
-  cells_before = hierarchy.values.size();
+  cells_before = hierarchy().values.size();
   warn_of_idle_supports();
   warn_of_pieces();
   load_structure();
-  backend->write(0, state.displacement, hold(std::vector<double>(held.size(), 0.0), true));
-  prescribed = std::any_of(held.begin(), held.end(), [](double x) { return x != 0; });
+  const std::vector<double> zero(3 * finest().point.size(), 0.0);
+  backend->write(0, state.displacement, structure->hold(zero, 0, true));
+  prescribed = structure->is_prescribed();
   if (motion) {
     const AddTime timer(clock.step);
     motion->start();
@@ -148,37 +169,12 @@ void Simulation::Impl::start() {
 void Simulation::Impl::build_structure() {
   check_memory();
   const AddTime timer(clock.structure);
-  hierarchy.levels.clear();
-  hierarchy.levels.push_back(finest_level(body));
-  Level& level = hierarchy.levels[0];
-  hierarchy.spacing = body.lattice().spacing;
-  hierarchy.lumped_mass = setup.time.lumped_mass;
-  hierarchy.cut = links_cut > 0;
-  hierarchy.poisson = {setup.material.poisson};
-  for (const Region& region : setup.regions) hierarchy.poisson.push_back(region.material.poisson);
-  const std::vector<std::int32_t> leaves = body.leaves();
-  hierarchy.values.resize(leaves.size());
-  for (std::size_t c = 0; c < leaves.size(); ++c) {
-    const std::uint8_t index = body.nodes()[leaves[c]].material;
-    const Material& material =
-        index == 0 ? setup.material : setup.regions[index - std::size_t{1}].material;
-    const double side = hierarchy.spacing * (1 << level.size_log2[c]);
-    hierarchy.values[c] = {material.young * side, material.density * side * side * side, index};
-  }
-  held = apply_supports(body.lattice(), setup.supports, level);
-  hanging = count_hanging(level);
-  piece = label_pieces(body, &pieces);
-  if (setup.time.mode == TimeMode::statics) {
-    FrozenCrumbs now = hold_crumbs(body.lattice(), piece, pieces, level);
-    if (now.pieces > crumbs.pieces) warnings.push_back(now.warning);
-    crumbs = std::move(now);
-  }
-  build_coarse_levels(hierarchy, {setup.solver.coarsest_vertices, setup.solver.max_levels,
-                                  setup.solver.duplicate_cells});
+  structure = std::make_unique<Structure>(setup, body);
+  for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
 }
 
 void Simulation::Impl::warn_of_idle_supports() {
-  const Level& level = hierarchy.levels[0];
+  const Level& level = finest();
   for (std::size_t i = 0; i < setup.supports.size(); ++i) {
     const auto holds = [&](const Vec3i& p) {
       return setup.supports[i].box.contains(body.lattice().point(p));
@@ -192,11 +188,12 @@ void Simulation::Impl::warn_of_idle_supports() {
 void Simulation::Impl::load_structure() {
   {
     const AddTime timer(clock.load);
-    backend->load(hierarchy);
-    backend->write(0, state.external, external_force(body.lattice(), setup.loads, hierarchy));
+    structure->pack();
+    backend->load(hierarchy());
+    backend->write(0, state.external, structure->external().on_all(hierarchy()));
     backend->mask(0, state.external);
   }
-  solver.set_structure(hierarchy);
+  solver.set_structure(hierarchy());
 }
 
 void Simulation::Impl::bind_surface() {
@@ -233,19 +230,8 @@ void Simulation::Impl::check_memory() const {
            " GB; lower body.resolution or raise body.refinement"));
 }
 
-// `values` with held components set: to the held displacement, or to zero.
-std::vector<double> Simulation::Impl::hold(std::vector<double> values, bool is_displacement) const {
-  const Level& level = hierarchy.levels[0];
-  for (std::int32_t v = 0; v < level.vertices(); ++v)
-    for (int c = 0; c < 3; ++c) {
-      const std::size_t k = 3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(c);
-      if ((level.fixed[v] >> c) & 1) values[k] = is_displacement ? held[k] : 0;
-    }
-  return values;
-}
-
 std::vector<double> Simulation::Impl::read_vector(int x) const {
-  std::vector<double> out(3 * hierarchy.levels[0].point.size());
+  std::vector<double> out(3 * finest().point.size());
   backend->read(0, x, out);
   return out;
 }
@@ -258,66 +244,147 @@ double Simulation::Impl::natural_time() const {
   return length / std::sqrt(shear / setup.material.density);
 }
 
-bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
-  const std::vector<std::int32_t> leaves_before = body.leaves();
-  const std::vector<double> u = read_vector(state.displacement);
-  std::vector<Vec3d> corners;
-  if (due.deformed) corners = cell_corners(body.lattice(), hierarchy.levels[0], u);
-  CutEvent event;
-  {
-    const AddTime timer(clock.cut);
-    event = cut(body, corners, due.blade, due.cut_id);
+// The deformed leaves that a blade may meet.
+DeformedLeaves Simulation::Impl::leaves_near(const TriangleMesh& blade) const {
+  const Vec3d origin = body.lattice().origin;
+  const BladeReach reach(blade, origin);
+  const Level& level = finest();
+  NearCells near;
+  std::vector<double> all, of_slots;
+  if (backend->can_update()) {
+    near = backend->find_near(state.displacement, reach);
+  } else {
+    all = read_vector(state.displacement);
+    near = near_cells(hierarchy(), all, reach);
   }
+  expects(near.finite && std::isfinite(norm(near.bounds.extent())),
+          "the deformed positions of the body are not finite: the simulation has diverged");
+  std::vector<std::int32_t> vertices;
+  for (const std::int32_t cell : near.cells)
+    vertices.insert(vertices.end(), level.slots[cell].begin(), level.slots[cell].end());
+  if (backend->can_update()) {
+    of_slots.resize(3 * vertices.size());
+    backend->read_some(0, state.displacement, vertices, of_slots);
+  } else {
+    of_slots = values_at(all, vertices);
+  }
+  return {{near.bounds.lo + origin, near.bounds.hi + origin},
+          near.cells,
+          corners_of_cells(body.lattice(), level, near.cells, of_slots)};
+}
+
+CutEvent Simulation::Impl::make_cut(const DueCut& due) {
+  const AddTime timer(clock.cut);
+  if (!due.deformed || due.blade.triangles.empty()) return cut(body, {}, due.blade, due.cut_id);
+  check_finite(due.blade, "the blade");
+  return cut_near(body, leaves_near(due.blade), due.blade, due.cut_id);
+}
+
+bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
+  const CutEvent event = make_cut(due);
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
   if (surface) {
     const AddTime timer(clock.surface);
     surface->update(body, event);
   }
-  if (!event.changed()) {
-    if (!event.moved.empty()) bind_surface();
-    return false;
+  if (event.changed()) {
+    check_memory();
+    change_structure(event);
   }
-
-  std::vector<double> rotations(4 * hierarchy.values.size());
-  backend->read_rotations(rotations);
-  std::vector<std::vector<double>> values{u, read_vector(state.velocity),
-                                          read_vector(state.memory)};
-  const Level before = std::move(hierarchy.levels[0]);
-  build_structure();
-  load_structure();
-  bind_surface();
-  transfer(before, leaves_before, std::move(values), rotations);
-  return true;
+  if (event.changed() || !event.moved.empty()) bind_surface();
+  return event.changed();
 }
 
-void Simulation::Impl::transfer(const Level& before, const std::vector<std::int32_t>& leaves_before,
-                                std::vector<std::vector<double>> values,
-                                const std::vector<double>& rotations) {
-  const AddTime timer(clock.structure);
-  std::vector<std::int32_t> cell_of(body.nodes().size(), -1);
-  for (std::size_t c = 0; c < leaves_before.size(); ++c)
-    cell_of[leaves_before[c]] = static_cast<std::int32_t>(c);
-  const std::vector<std::int32_t> leaves = body.leaves();
-  std::vector<std::int32_t> origin(leaves.size());
-  std::vector<double> turned(4 * leaves.size());
-  for (std::size_t c = 0; c < leaves.size(); ++c) {
-    std::int32_t leaf = leaves[c];
-    while (cell_of[leaf] < 0) leaf = body.nodes()[leaf].parent;
-    origin[c] = cell_of[leaf];
-    for (std::size_t k = 0; k < 4; ++k)
-      turned[4 * c + k] = rotations[4 * static_cast<std::size_t>(origin[c]) + k];
-  }
-  const Level& after = hierarchy.levels[0];
-  std::vector<double> u = transfer_values(before, values[0], after, origin);
-  for (const std::size_t k : crumbs.components) held[k] = u[k];
-  backend->write(0, state.displacement, hold(std::move(u), true));
-  // A vertex that the refinement puts into a support stands still from now on.
+// Vectors of the state, and whether they hold a displacement.
+std::array<std::pair<int, bool>, 3> Simulation::Impl::state_vectors() const {
   const bool memory_is_displacement = setup.time.scheme == TimeScheme::central;
-  backend->write(0, state.velocity, hold(transfer_values(before, values[1], after, origin), false));
-  backend->write(0, state.memory,
-                 hold(transfer_values(before, values[2], after, origin), memory_is_displacement));
-  backend->write_rotations(turned);
+  return {{{state.displacement, true},
+           {state.velocity, false},
+           {state.memory, memory_is_displacement}}};
+}
+
+void Simulation::Impl::change_structure(const CutEvent& event) {
+  const bool keeps = backend->can_update();
+  Kept kept;
+  if (!keeps) kept = read_state(finest().vertices(), finest().cells());
+  bool in_place = false;
+  {
+    const AddTime timer(clock.structure);
+    in_place = structure->update(body, event);
+  }
+  for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
+  if (keeps && in_place) {
+    update_backend();
+  } else {
+    const LevelChange& change = structure->finest_change();
+    if (keeps) kept = read_state(change.vertices_before, change.cells_before);
+    load_structure();
+    write_state(std::move(kept));
+  }
+}
+
+// All that a load forgets.
+Kept Simulation::Impl::read_state(std::int32_t vertices, std::int32_t cells) const {
+  const AddTime timer(clock.structure);
+  Kept kept;
+  for (const auto& [vector, is_displacement] : state_vectors()) {
+    kept.vectors.emplace_back(3 * static_cast<std::size_t>(vertices));
+    backend->read(0, vector, kept.vectors.back());
+  }
+  kept.rotations.resize(4 * static_cast<std::size_t>(cells));
+  backend->read_rotations(kept.rotations);
+  return kept;
+}
+
+// The same again, and what is new beside it.
+void Simulation::Impl::write_state(Kept kept) {
+  const AddTime timer(clock.structure);
+  const LevelChange& change = structure->finest_change();
+  const NewVertices fresh = new_vertices(finest(), change);
+  for (std::size_t i = 0; i < kept.vectors.size(); ++i) {
+    std::vector<double>& values = kept.vectors[i];
+    const std::vector<double> more = fresh.combine(values_at(values, fresh.source));
+    values.insert(values.end(), more.begin(), more.end());
+    if (i == 0) structure->hold_crumbs_at(values);
+    const auto [vector, is_displacement] = state_vectors()[i];
+    backend->write(0, vector, structure->hold(std::move(values), 0, is_displacement));
+  }
+  for (const std::int32_t origin : change.origin)
+    for (std::size_t k = 0; k < 4; ++k)
+      kept.rotations.push_back(kept.rotations[4 * static_cast<std::size_t>(origin) + k]);
+  backend->write_rotations(kept.rotations);
+}
+
+// The backend keeps what it has, and is told what is new.
+void Simulation::Impl::update_backend() {
+  const LevelChange& change = structure->finest_change();
+  {
+    const AddTime timer(clock.load);
+    backend->update(hierarchy(), structure->change());
+    const std::vector<std::int32_t> loaded = structure->reloaded();
+    std::vector<double> force = structure->external().on(hierarchy(), loaded);
+    for (std::size_t k = 0; k < force.size(); ++k)
+      if ((finest().fixed[loaded[k / 3]] >> (k % 3)) & 1) force[k] = 0;
+    backend->write_some(0, state.external, loaded, force);
+  }
+  solver.set_structure(hierarchy());
+  const AddTime timer(clock.structure);
+  const NewVertices fresh = new_vertices(finest(), change);
+  std::vector<std::int32_t> numbers(finest().point.size() - change.vertices_before);
+  std::iota(numbers.begin(), numbers.end(), change.vertices_before);
+  std::vector<double> sources(3 * fresh.source.size());
+  for (const auto& [vector, is_displacement] : state_vectors()) {
+    backend->read_some(0, vector, fresh.source, sources);
+    std::vector<double> values = fresh.combine(sources);
+    if (is_displacement && structure->has_crumbs()) {
+      std::vector<double> all = read_vector(vector);
+      std::copy(values.begin(), values.end(), all.end() - std::ssize(values));
+      structure->hold_crumbs_at(all);
+    }
+    values = structure->hold(std::move(values), change.vertices_before, is_displacement);
+    backend->write_some(0, vector, numbers, values);
+  }
 }
 
 void Simulation::Impl::copy_state(const StateVectors& from, const StateVectors& to) {
@@ -339,8 +406,10 @@ void Simulation::Impl::step_back() {
 
 // A body in crumbs is a surprise, and in dynamics they fall.
 void Simulation::Impl::warn_of_pieces() {
+  const std::size_t pieces = structure->pieces();
   if (pieces < 2 || setup.time.mode == TimeMode::statics) return;
-  const Level& level = hierarchy.levels[0];
+  const Level& level = finest();
+  const std::vector<std::int32_t> piece = structure->piece_of_cells();
   std::vector<char> is_held(pieces, 0);
   for (std::int32_t c = 0; c < level.cells(); ++c)
     for (const std::int32_t v : level.slots[c])
@@ -358,9 +427,9 @@ NonlinearStats Simulation::Impl::solve_step() {
 StepReport Simulation::Impl::step() {
   const Timer timer;
   StepReport report;
-  report.pieces_before = pieces;
+  report.pieces_before = structure->pieces();
   for (const DueCut& due : schedule.due(steps)) apply_cut(due, report);
-  report.pieces = pieces;
+  report.pieces = structure->pieces();
 
   if (motion) copy_state(state, before_step);
   const NonlinearStats stats = solve_step();
@@ -374,8 +443,8 @@ StepReport Simulation::Impl::step() {
   report.linear_residual = stats.linear_residual;
   report.residual = stats.residual;
   report.converged = stats.converged;
-  report.cells = hierarchy.values.size();
-  report.vertices = hierarchy.levels[0].point.size();
+  report.cells = hierarchy().values.size();
+  report.vertices = finest().point.size();
   if (motion && !std::isfinite(stats.residual)) {
     step_back();
     report.residual = std::numeric_limits<double>::max();
@@ -411,25 +480,25 @@ void Simulation::on_progress(Progress progress) { impl_->progress = std::move(pr
 double Simulation::time() const { return impl_->time; }
 const SimulationSetup& Simulation::setup() const { return impl_->setup; }
 const LinkedOctree& Simulation::body() const { return impl_->body; }
-const Hierarchy& Simulation::hierarchy() const { return impl_->hierarchy; }
+const Hierarchy& Simulation::hierarchy() const { return impl_->hierarchy(); }
 const Backend& Simulation::backend() const { return *impl_->backend; }
-std::size_t Simulation::cells() const { return impl_->hierarchy.values.size(); }
+std::size_t Simulation::cells() const { return impl_->hierarchy().values.size(); }
 std::size_t Simulation::cells_before_cuts() const { return impl_->cells_before; }
-std::size_t Simulation::vertices() const { return impl_->hierarchy.levels[0].point.size(); }
-std::size_t Simulation::hanging() const { return impl_->hanging; }
-std::size_t Simulation::pieces() const { return impl_->pieces; }
+std::size_t Simulation::vertices() const { return impl_->finest().point.size(); }
+std::size_t Simulation::hanging() const { return count_hanging(impl_->finest()); }
+std::size_t Simulation::pieces() const { return impl_->structure->pieces(); }
 std::size_t Simulation::links_cut() const { return impl_->links_cut; }
 const std::vector<std::string>& Simulation::warnings() const { return impl_->warnings; }
 
 std::size_t Simulation::unknowns() const {
   std::size_t count = 0;
-  for (const std::uint8_t fixed : impl_->hierarchy.levels[0].fixed)
+  for (const std::uint8_t fixed : impl_->finest().fixed)
     for (int c = 0; c < 3; ++c) count += ((fixed >> c) & 1) == 0;
   return count;
 }
 
 std::size_t Simulation::bytes() const {
-  return impl_->body.bytes() + impl_->hierarchy.bytes() + impl_->backend->bytes() +
+  return impl_->body.bytes() + impl_->structure->bytes() + impl_->backend->bytes() +
          impl_->solver.bytes() + (impl_->surface ? impl_->surface->bytes() : 0) +
          (impl_->positions.capacity() + impl_->normals.capacity()) * sizeof(Vec3d);
 }
@@ -452,15 +521,15 @@ PhaseTimes Simulation::seconds() const {
 
 Snapshot Simulation::snapshot() const {
   Snapshot out =
-      make_snapshot(impl_->body, impl_->hierarchy, impl_->read_vector(impl_->state.displacement),
+      make_snapshot(impl_->body, impl_->hierarchy(), impl_->read_vector(impl_->state.displacement),
                     impl_->read_vector(impl_->state.velocity),
-                    external_force(impl_->body.lattice(), impl_->setup.loads, impl_->hierarchy));
-  out.piece = impl_->piece;
-  const Level& level = impl_->hierarchy.levels[0];
-  std::vector<double> rotations(4 * impl_->hierarchy.values.size());
+                    impl_->structure->external().on_all(impl_->hierarchy()));
+  out.piece = impl_->structure->piece_of_cells();
+  const Level& level = impl_->finest();
+  std::vector<double> rotations(4 * impl_->hierarchy().values.size());
   impl_->backend->read_rotations(rotations);
   for (std::int32_t c = 0; c < level.cells(); ++c) {
-    const std::uint8_t index = impl_->hierarchy.values[c].material;
+    const std::uint8_t index = impl_->hierarchy().values[c].material;
     const Material& material =
         index == 0 ? impl_->setup.material : impl_->setup.regions[index - std::size_t{1}].material;
     out.young.push_back(material.young);
@@ -475,7 +544,7 @@ Snapshot Simulation::snapshot() const {
 SurfaceMesh Simulation::surface_mesh() const {
   expects(!impl_->broken, "surface_mesh: not during a step, nor after one that threw");
   if (!impl_->surface) return {};
-  return impl_->surface->mesh(impl_->positions, impl_->normals, impl_->piece);
+  return impl_->surface->mesh(impl_->positions, impl_->normals, impl_->structure->piece_of_cells());
 }
 
 std::uint64_t Simulation::state_hash() const {
@@ -494,15 +563,15 @@ std::uint64_t Simulation::state_hash() const {
 }
 
 double Simulation::volume() const {
-  const Level& level = impl_->hierarchy.levels[0];
+  const Level& level = impl_->finest();
   double finest = 0;
   for (const std::uint8_t log2 : level.size_log2) finest += static_cast<double>(1 << (3 * log2));
-  const double h = impl_->hierarchy.spacing;
+  const double h = impl_->hierarchy().spacing;
   return finest * h * h * h;
 }
 
 std::vector<Vec3d> Simulation::deformed_corners() const {
-  return cell_corners(impl_->body.lattice(), impl_->hierarchy.levels[0],
+  return cell_corners(impl_->body.lattice(), impl_->finest(),
                       impl_->read_vector(impl_->state.displacement));
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/levels/corners.hpp"
+#include "kernels/transfer.hpp"
 
 namespace kerf {
 namespace {
@@ -42,8 +43,19 @@ Vec3d at(std::span<const double> x, std::int32_t vertex) {
   return {x[i], x[i + 1], x[i + 2]};
 }
 
+// Where the corners of a cell lie that moved by u.
+void place_corners(const Lattice& lattice, const Level& level, std::int32_t cell,
+                   const Vec3d (&u)[8], Vec3d* out) {
+  const int size = 1 << level.size_log2[cell];
+  for (int i = 0; i < 8; ++i) {
+    Vec3i p = level.corner[cell];
+    for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) * size;
+    out[i] = lattice.point(p) + u[i];
+  }
+}
+
 void add_boundary(const LinkedOctree& body, Snapshot& out) {
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const std::vector<std::int32_t>& leaves = body.leaves();
   for (std::size_t c = 0; c < leaves.size(); ++c) {
     const LinkedOctree::Node& leaf = body.nodes()[leaves[c]];
     if (leaf.size_log2 != 0) continue;  // larger leaves are linked on all sides
@@ -68,11 +80,23 @@ std::vector<Vec3d> cell_corners(const Lattice& lattice, const Level& level,
   for (std::int32_t cell = 0; cell < level.cells(); ++cell) {
     Vec3d u[8];
     corner_values(level, cell, displacement, u);
-    for (int i = 0; i < 8; ++i) {
-      Vec3i p = level.corner[cell];
-      for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) << level.size_log2[cell];
-      out[8 * static_cast<std::size_t>(cell) + i] = lattice.point(p) + u[i];
+    place_corners(lattice, level, cell, u, &out[8 * static_cast<std::size_t>(cell)]);
+  }
+  return out;
+}
+
+std::vector<Vec3d> corners_of_cells(const Lattice& lattice, const Level& level,
+                                    std::span<const std::int32_t> cells,
+                                    std::span<const double> of_slots) {
+  std::vector<Vec3d> out(8 * cells.size());
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    Vec3d slots[8], u[8];
+    for (std::size_t i = 0; i < 8; ++i) {
+      const double* at = &of_slots[24 * k + 3 * i];
+      slots[i] = {at[0], at[1], at[2]};
     }
+    kernels::unfold(slots, level.fold[cells[k]], u);
+    place_corners(lattice, level, cells[k], u, &out[8 * k]);
   }
   return out;
 }

@@ -14,6 +14,11 @@ namespace kerf {
 std::vector<Vec3d> cell_corners(const Lattice& lattice, const Level& level,
                                 std::span<const double> displacement);
 
+/// The same of some cells, from the displacements of their slots, eight times three for each.
+std::vector<Vec3d> corners_of_cells(const Lattice& lattice, const Level& level,
+                                    std::span<const std::int32_t> cells,
+                                    std::span<const double> of_slots);
+
 /// Hanging corners of a level, each place of each component once.
 std::size_t count_hanging(const Level& level);
 

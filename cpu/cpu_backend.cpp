@@ -34,6 +34,7 @@ class CpuBackend final : public Backend {
   explicit CpuBackend(const CpuOptions& options)
       : threads_(options.threads > 0 ? options.threads : omp_get_max_threads()),
         tile_log2_(options.tile_log2),
+        updates_(options.updates),
         coarsest_factor_(CholeskyEngine::simplicial) {
     expects(options.threads >= 0 && options.threads <= kMaxThreads,
             text("solver.threads must lie in 0 .. ", kMaxThreads, "; 0 takes all cores"));
@@ -44,6 +45,8 @@ class CpuBackend final : public Backend {
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;
+  bool can_update() const noexcept override { return updates_; }
+  void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override { smoother_ = options; }
   int add_vector() override;
 
@@ -82,6 +85,11 @@ class CpuBackend final : public Backend {
   void mask(int level, int x) override;
   void write(int level, int x, std::span<const double> values) override;
   void read(int level, int x, std::span<double> values) const override;
+  void write_some(int level, int x, std::span<const std::int32_t> vertices,
+                  std::span<const double> values) override;
+  void read_some(int level, int x, std::span<const std::int32_t> vertices,
+                 std::span<double> values) const override;
+  NearCells find_near(int displacement, const BladeReach& reach) const override;
 
  private:
   // Calls body(i) for i in [0, count), the range cut into one slab a thread. Below `worth` items,
@@ -94,6 +102,7 @@ class CpuBackend final : public Backend {
   static constexpr std::int32_t kWorthCells = 512;      // hundreds of operations an item
   static constexpr std::int32_t kWorthVertices = 4096;  // tens
   static constexpr std::int32_t kWorthScalars = 65536;  // one or two
+  void fit_to_levels();
   template <class CellBody>
   void cells_to_vertices(LevelStore& store, double* out, bool masks, const CellBody& body);
   void gauss_seidel(LevelStore& store, int level, SweepOrder order);
@@ -108,6 +117,7 @@ class CpuBackend final : public Backend {
 
   int threads_;
   int tile_log2_;
+  bool updates_;
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   FinestStore finest_;
@@ -146,20 +156,37 @@ void CpuBackend::load(const Hierarchy& hierarchy) {
     store.level = &hierarchy.levels[l];
     store.finest = l == 0 ? &finest_ : nullptr;
     store.tile_log2 = tile_log2_;
+    store.vectors.clear();
+    store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
+  }
+  fit_to_levels();
+}
+
+// Arrays of the sizes of the levels. Vectors are longer by zeros; of the rest nothing is kept.
+void CpuBackend::fit_to_levels() {
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    LevelStore& store = levels_[l];
     store.bound = 0;
     store.solution_is_zero = false;
-    store.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
+    store.colours = {};
     for (auto& vector : store.vectors)
-      vector.assign(3 * static_cast<std::size_t>(store.vertices()), 0.0);
+      vector.resize(3 * static_cast<std::size_t>(store.vertices()), 0.0);
     store.products.resize(8 * static_cast<std::size_t>(store.cells()));
-    store.inverse_diagonal.assign(store.vertices(), {});
-    store.matrices.clear();
+    store.inverse_diagonal.resize(store.vertices());
     if (l > 0)
       store.matrices.resize(
           kernels::tiled_size(static_cast<std::size_t>(store.cells()), kEntries, tile_log2_));
   }
   coarsest_ = std::make_unique<AssembledLevel>(*levels_.back().level);
   coarsest_factor_.analyse(*coarsest_);
+}
+
+void CpuBackend::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
+  ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
+          "a change is not one of the hierarchy that was loaded");
+  for (const std::int32_t origin : change.levels[0].origin)
+    finest_.rotation.push_back(finest_.rotation[origin]);
+  fit_to_levels();
 }
 
 int CpuBackend::add_vector() {
@@ -207,8 +234,7 @@ void CpuBackend::coarsen(int fine) {
   LevelStore& to = levels_[fine + 1];
   parallel(to.cells(), [&](std::int32_t cell) {
     double sum[kEntries] = {};
-    for (std::int32_t k = to.level->child_begin[cell]; k < to.level->child_begin[cell + 1]; ++k) {
-      const std::int32_t child = to.level->children[k];
+    for (const std::int32_t child : to.level->children_of(cell)) {
       double packed[kEntries];
       cpu::cell_matrix(from, child, packed);
       if (from.level->place[child] == Level::kPassed) {
@@ -231,8 +257,7 @@ void CpuBackend::prepare(int level) {
   const Level& l = *store.level;
   parallel(store.vertices(), [&](std::int32_t v) {
     Sym sum{};
-    for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-      sum += cpu::diagonal_block(store, l.incidence[k] / 8, l.incidence[k] % 8);
+    for (const std::int32_t k : l.incidences_of(v)) sum += cpu::diagonal_block(store, k / 8, k % 8);
     const std::uint8_t fixed = l.fixed[v];
     if (fixed & 1) sum.xx = sum.xy = sum.xz = 0;
     if (fixed & 2) sum.yy = sum.xy = sum.yz = 0;
@@ -276,8 +301,7 @@ void CpuBackend::cells_to_vertices(LevelStore& store, double* out, bool masks,
       store.vertices(),
       [&](std::int32_t v) {
         Vec sum{};
-        for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-          sum += store.products[l.incidence[k]];
+        for (const std::int32_t k : l.incidences_of(v)) sum += store.products[k];
         cpu::store(out, v, masks ? masked(sum, l.fixed[v]) : sum);
       },
       kWorthVertices);
@@ -352,14 +376,15 @@ void CpuBackend::gauss_seidel(LevelStore& store, int level, SweepOrder order) {
   const Level& l = *store.level;
   double* u = changed(level, kSolution);
   const double* f = store.vectors[kRight].data();
-  for (int step = 0; step < l.colours(); ++step) {
-    const int colour = order == SweepOrder::forward ? step : l.colours() - 1 - step;
-    const std::int32_t begin = l.colour_begin[colour];
-    parallel(l.colour_begin[colour + 1] - begin, [&](std::int32_t i) {
-      const std::int32_t v = l.colour_order[begin + i];
+  if (store.colours.order.empty()) store.colours = colour_vertices(l);
+  const Colours& colours = store.colours;
+  for (int step = 0; step < colours.count(); ++step) {
+    const int colour = order == SweepOrder::forward ? step : colours.count() - 1 - step;
+    const std::int32_t begin = colours.begin[colour];
+    parallel(colours.begin[colour + 1] - begin, [&](std::int32_t i) {
+      const std::int32_t v = colours.order[begin + i];
       Vec r = cpu::load(f, v);
-      for (std::int32_t k = l.incidence_begin[v]; k < l.incidence_begin[v + 1]; ++k)
-        r -= cpu::cell_row(store, l.incidence[k] / 8, l.incidence[k] % 8, u);
+      for (const std::int32_t k : l.incidences_of(v)) r -= cpu::cell_row(store, k / 8, k % 8, u);
       const Vec at = cpu::load(u, v);
       cpu::store(u, v, kernels::relax_vertex(at, r, store.inverse_diagonal[v], smoother_.omega));
     });
@@ -403,13 +428,12 @@ void CpuBackend::restrict_residual(int fine) {
   const double* r = data(fine, kResidual);
   parallel(to.cells(), [&](std::int32_t cell) {
     Vec sum[8];
-    for (std::int32_t k = c.child_begin[cell]; k < c.child_begin[cell + 1]; ++k) {
-      const std::int32_t child = c.children[k];
+    for (const std::int32_t child : c.children_of(cell)) {
       double w[8][8];
       kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);
       for (int i = 0; i < 8; ++i) {
         const std::int32_t v = f.slots[child][i];
-        if (f.incidence[f.incidence_begin[v]] != 8 * child + i) continue;
+        if (f.incidences_of(v)[0] != 8 * child + i) continue;
         const Vec at = cpu::load(r, v);
         for (int m = 0; m < 8; ++m)
           if (w[i][m] != 0) sum[m] += w[i][m] * at;
@@ -422,8 +446,7 @@ void CpuBackend::restrict_residual(int fine) {
       to.vertices(),
       [&](std::int32_t v) {
         Vec sum{};
-        for (std::int32_t k = c.incidence_begin[v]; k < c.incidence_begin[v + 1]; ++k)
-          sum += to.products[c.incidence[k]];
+        for (const std::int32_t k : c.incidences_of(v)) sum += to.products[k];
         cpu::store(out, v, masked(sum, c.fixed[v]));
       },
       kWorthVertices);
@@ -437,7 +460,7 @@ void CpuBackend::prolong_correction(int fine) {
   parallel(
       f.vertices(),
       [&](std::int32_t v) {
-        const std::int32_t first = f.incidence[f.incidence_begin[v]];
+        const std::int32_t first = f.incidences_of(v)[0];
         const std::int32_t child = first / 8, cell = f.parent[child];
         double w[8][8];
         kernels::transfer_weights(f.fold[child], f.place[child], c.fold[cell], w);
@@ -524,6 +547,44 @@ void CpuBackend::read(int level, int x, std::span<double> values) const {
   const auto& vector = levels_[level].vectors[x];
   expects(values.size() == vector.size(), "read: three values per vertex of the level");
   std::copy(vector.begin(), vector.end(), values.begin());
+}
+
+void CpuBackend::write_some(int level, int x, std::span<const std::int32_t> vertices,
+                            std::span<const double> values) {
+  double* to = changed(level, x);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    to[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3] = values[k];
+}
+
+void CpuBackend::read_some(int level, int x, std::span<const std::int32_t> vertices,
+                           std::span<double> values) const {
+  const double* from = levels_[level].vectors[x].data();
+  for (std::size_t k = 0; k < values.size(); ++k)
+    values[k] = from[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3];
+}
+
+NearCells CpuBackend::find_near(int displacement, const BladeReach& reach) const {
+  constexpr std::int32_t kChunk = 8192;
+  FindNear find(*hierarchy_, levels_[0].vectors[displacement], reach);
+  NearCells out;
+  const auto in_chunks = [&](std::int32_t count, const auto& look) {
+    std::vector<NearCells> found((count + kChunk - 1) / kChunk);
+    parallel(
+        static_cast<std::int32_t>(found.size()),
+        [&](std::int32_t i) { look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]); }, 2);
+    for (const NearCells& part : found) {
+      out.finite = out.finite && part.finite;
+      out.bounds.add(part.bounds);
+      out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
+    }
+  };
+  in_chunks(levels_[0].vertices(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
+    find.look_at_vertices(first, last, part);
+  });
+  in_chunks(levels_[0].cells(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
+    find.look_at_cells(first, last, part);
+  });
+  return out;
 }
 
 }  // namespace

@@ -79,27 +79,87 @@ void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, Finest
     values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
 }
 
+/// All of a level but its vectors.
+template <class S>
+void FastBackend<S>::load_level(std::size_t l) {
+  FastLevel<S>& level = levels_[l];
+  level.patched =
+      make_patches(*hierarchy_, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
+  if (l > 0) fill_weights(level.patched, levels_[l - 1].patched);
+  level.bound = 0;
+  level.solution_is_zero = false;
+  level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
+}
+
+template <class S>
+void FastBackend<S>::load_coarsest() {
+  coarsest_ = std::make_unique<AssembledLevel>(hierarchy_->levels.back());
+  coarsest_factor_.analyse(*coarsest_);
+}
+
 template <class S>
 void FastBackend<S>::load(const Hierarchy& hierarchy) {
   hierarchy_ = &hierarchy;
   waiting_ = -1;
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
+    load_level(l);
     FastLevel<S>& level = levels_[l];
-    level.patched =
-        make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
-    if (l > 0) fill_weights(level.patched, levels_[l - 1].patched);
-    level.bound = 0;
-    level.solution_is_zero = false;
     level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (std::size_t x = 0; x < level.vectors.size(); ++x)
       allocate(level.vectors[x], level.patched, x >= kLevelVectors);
-    level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
   }
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
-  coarsest_ = std::make_unique<AssembledLevel>(hierarchy.levels.back());
-  coarsest_factor_.analyse(*coarsest_);
+  load_coarsest();
+}
+
+/// `from` in other numbers; what is new is zero.
+template <class T>
+void renumber(const std::vector<std::int32_t>& before, const PatchedLevel& now,
+              std::vector<T>& vector) {
+  if (vector.empty()) return;
+  std::vector<T> to(kTileScalars * now.tiles(), T(0));
+  for (std::size_t v = 0; v < before.size(); ++v)
+    for (std::size_t c = 0; c < 3; ++c)
+      to[scalar_of(now.packed[v]) + kGroup * c] = vector[scalar_of(before[v]) + kGroup * c];
+  vector = std::move(to);
+}
+
+// Patches are made anew, all of them, since their numbers follow each other; vectors and rotations
+// stay here.
+template <class S>
+void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
+  ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
+          "a change is not one of the hierarchy that was loaded");
+  settle();
+  const std::vector<std::int32_t> lane_before = std::move(levels_[0].patched.lane);
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    const std::vector<std::int32_t> packed_before = std::move(levels_[l].patched.packed);
+    load_level(l);
+    auto& vectors = levels_[l].vectors;
+    parallel(static_cast<std::int32_t>(vectors.size()), 2, [&](std::int32_t x) {
+      renumber(packed_before, levels_[l].patched, vectors[x].single);
+      renumber(packed_before, levels_[l].patched, vectors[x].exact);
+    });
+  }
+  const FinestValues<double> before = std::move(exact_);
+  const PatchedLevel& now = levels_[0].patched;
+  start_values(hierarchy, now, exact_);
+  if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, now, single_);
+  const LevelChange& finest = change.levels[0];
+  const auto place = [](std::size_t lane) { return 4 * kGroup * (lane / kGroup) + lane % kGroup; };
+  for (std::size_t c = 0; c < now.lane.size(); ++c) {
+    const auto cells_before = static_cast<std::size_t>(finest.cells_before);
+    const std::size_t origin =
+        c < cells_before ? c : static_cast<std::size_t>(finest.origin[c - cells_before]);
+    const std::size_t from = place(static_cast<std::size_t>(lane_before[origin]));
+    const std::size_t to = place(static_cast<std::size_t>(now.lane[c]));
+    for (std::size_t k = 0; k < 4; ++k)
+      exact_.rotation[to + kGroup * k] = before.rotation[from + kGroup * k];
+  }
+  round_rotations();
+  load_coarsest();
 }
 
 template <class S>
@@ -261,15 +321,15 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   const Level& coarse = *to.level;
   const std::int32_t* cells = to.cell.data() + kGroup * group + first;
   for (P& entry : out) entry = P{};
-  for (std::int32_t n = 0;; ++n) {
+  for (std::size_t n = 0;; ++n) {
     std::int32_t child[P::kLanes];
     bool any = false;
     for (int k = 0; k < P::kLanes; ++k) {
       child[k] = -1;
       if (cells[k] < 0) continue;
-      const std::int32_t at = coarse.child_begin[cells[k]] + n;
-      if (at >= coarse.child_begin[cells[k] + 1]) continue;
-      child[k] = coarse.children[at];
+      const auto children = coarse.children_of(cells[k]);
+      if (n >= children.size()) continue;
+      child[k] = children[n];
       any = true;
     }
     if (!any) break;

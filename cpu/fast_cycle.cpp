@@ -416,6 +416,60 @@ void FastBackend<S>::read(int level, int x, std::span<double> values) const {
   });
 }
 
+template <class S>
+void FastBackend<S>::write_some(int level, int x, std::span<const std::int32_t> vertices,
+                                std::span<const double> values) {
+  settle();
+  changed(level, x);
+  FastLevel<S>& l = levels_[level];
+  with_types(l.vectors[x], l.vectors[x], [&](const auto*, auto* to) {
+    using T = std::decay_t<decltype(*to)>;
+    for (std::size_t k = 0; k < values.size(); ++k)
+      to[scalar_of(l.patched.packed[vertices[k / 3]]) + kGroup * (k % 3)] =
+          static_cast<T>(values[k]);
+  });
+}
+
+template <class S>
+void FastBackend<S>::read_some(int level, int x, std::span<const std::int32_t> vertices,
+                               std::span<double> values) const {
+  const_cast<FastBackend*>(this)->settle();
+  const FastLevel<S>& l = levels_[level];
+  with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
+    for (std::size_t k = 0; k < values.size(); ++k)
+      values[k] = from[scalar_of(l.patched.packed[vertices[k / 3]]) + kGroup * (k % 3)];
+  });
+}
+
+template <class S>
+NearCells FastBackend<S>::find_near(int displacement, const BladeReach& reach) const {
+  std::vector<double> values(3 * levels_[0].patched.packed.size());
+  read(0, displacement, values);
+  constexpr std::int32_t kChunk = 8192;
+  FindNear find(*hierarchy_, values, reach);
+  NearCells out;
+  const auto in_chunks = [&](std::int32_t count, const auto& look) {
+    std::vector<NearCells> found((count + kChunk - 1) / kChunk);
+    parallel(static_cast<std::int32_t>(found.size()), 2, [&](std::int32_t i) {
+      look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]);
+    });
+    for (const NearCells& part : found) {
+      out.finite = out.finite && part.finite;
+      out.bounds.add(part.bounds);
+      out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
+    }
+  };
+  in_chunks(static_cast<std::int32_t>(levels_[0].patched.packed.size()),
+            [&](std::int32_t first, std::int32_t last, NearCells& part) {
+              find.look_at_vertices(first, last, part);
+            });
+  in_chunks(static_cast<std::int32_t>(levels_[0].patched.lane.size()),
+            [&](std::int32_t first, std::int32_t last, NearCells& part) {
+              find.look_at_cells(first, last, part);
+            });
+  return out;
+}
+
 template class FastBackend<float>;
 template class FastBackend<double>;
 

@@ -90,6 +90,8 @@ class FastBackend final : public Backend {
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;
+  bool can_update() const noexcept override { return true; }
+  void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override {
     expects(options.chebyshev,
             "this backend smooths by Chebyshev; Gauss-Seidel needs the reference backend");
@@ -135,6 +137,11 @@ class FastBackend final : public Backend {
   void mask(int level, int x) override;
   void write(int level, int x, std::span<const double> values) override;
   void read(int level, int x, std::span<double> values) const override;
+  void write_some(int level, int x, std::span<const std::int32_t> vertices,
+                  std::span<const double> values) override;
+  void read_some(int level, int x, std::span<const std::int32_t> vertices,
+                 std::span<double> values) const override;
+  NearCells find_near(int displacement, const BladeReach& reach) const override;
 
  private:
   template <class Body>
@@ -153,6 +160,8 @@ class FastBackend final : public Backend {
   static constexpr std::size_t kWorthCells = 4096;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 
+  void load_level(std::size_t l);
+  void load_coarsest();
   void allocate(FastVector& vector, const PatchedLevel& level, bool exact) const;
   void round_rotations();
   template <class T>

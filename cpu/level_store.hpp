@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/backend.hpp"
+#include "core/levels/colours.hpp"
 #include "kernels/hex_element.hpp"
 #include "kernels/layout.hpp"
 #include "kernels/mat3.hpp"
@@ -46,6 +47,7 @@ struct LevelStore {
   bool solution_is_zero = false;             // known: the first residual is f, no product needed
   std::vector<std::vector<double>> vectors;  // by VectorId, 3 per vertex
   std::vector<Vec> products;                 // 8 per cell: what each cell adds to its slots
+  Colours colours;                           // once Gauss-Seidel asks for them
 
   std::int32_t cells() const { return level->cells(); }
   std::int32_t vertices() const { return level->vertices(); }

@@ -289,8 +289,8 @@ void find_held(const PatchedLevel* finer, PatchedLevel& out) {
       for (const std::int32_t v : level.slots[c])
         out.held[c] = static_cast<std::uint8_t>(out.held[c] | level.fixed[v]);
     } else {
-      for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k)
-        out.held[c] = static_cast<std::uint8_t>(out.held[c] | finer->held[level.children[k]]);
+      for (const std::int32_t child : level.children_of(c))
+        out.held[c] = static_cast<std::uint8_t>(out.held[c] | finer->held[child]);
     }
 }
 
@@ -298,12 +298,12 @@ std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const Patched
   const Level& level = *out.level;
   std::vector<std::uint16_t> kind_of(level.corner.size(), kMerged);
   for (std::int32_t c = 0; c < level.cells(); ++c) {
-    const std::int32_t child = level.children[level.child_begin[c]];
-    if (finer.level->place[child] == kernels::kPassed) kind_of[c] = kPassed;
+    const auto children = level.children_of(c);
+    if (finer.level->place[children[0]] == kernels::kPassed) kind_of[c] = kPassed;
     unsigned octants = 0;  // without duplication two children can have one
     bool twice = false;
-    for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k) {
-      const unsigned bit = 1U << (finer.level->place[level.children[k]] % 8);
+    for (const std::int32_t child : children) {
+      const unsigned bit = 1U << (finer.level->place[child] % 8);
       twice = twice || (octants & bit) != 0;
       octants |= bit;
     }
@@ -318,8 +318,7 @@ void place_children(const PatchedLevel& finer, PatchedLevel& out) {
   for (std::size_t lane = 0; lane < out.cell.size(); ++lane) {
     const std::int32_t c = out.cell[lane];
     if (c < 0) continue;
-    for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k) {
-      const std::int32_t child = level.children[k];
+    for (const std::int32_t child : level.children_of(c)) {
       const std::size_t octant = finer.level->place[child] % 8;  // kPassed: 0
       out.children[8 * kGroup * (lane / kGroup) + kGroup * octant + lane % kGroup] =
           finer.lane[child];

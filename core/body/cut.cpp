@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/base/error.hpp"
 #include "core/body/cell_map.hpp"
@@ -32,6 +33,7 @@ double largest(const Vec3d& v) { return std::max({std::abs(v.x), std::abs(v.y), 
 
 /// A triangle on the integer lattice, and its plane in doubles for quick rejection.
 struct BladeTriangle {
+  std::array<Vec3d, 3> corners{};
   std::array<Int3, 3> points{};
   Box3 box;        ///< with the margin that covers rounding
   Vec3d normal{};  ///< unit
@@ -93,10 +95,11 @@ Box3 quantiser_box(const Box3& body, const Box3& blade) {
 /// Finds the links that a blade crosses.
 class LinkSearch {
  public:
-  LinkSearch(const LinkedOctree& body, std::span<const Vec3d> corners, const Box3& body_box,
+  /// `corners` holds eight for each leaf of `numbers`, or none in the reference state.
+  LinkSearch(const LinkedOctree& body, std::span<const std::int32_t> numbers,
+             std::span<const Vec3d> corners, const Box3& body_box, const TriangleMesh& blade,
              const Box3& blade_box)
       : body_(body),
-        corners_(corners),
         quantiser_(quantiser_box(body_box, blade_box)),
         // Small query boxes along a slanted triangle, but not too many if the body has grown.
         reach_(std::max(4 * body.lattice().spacing, largest(body_box.extent()) / 256)),
@@ -104,22 +107,17 @@ class LinkSearch {
                 32 * std::numeric_limits<double>::epsilon() *
                     std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box.lo),
                               largest(blade_box.hi)})),
-        near_(leaves_near(blade_box)),
+        triangles_(prepare(blade)),
+        near_(leaves_near(numbers, corners, blade_box)),
         tree_(boxes_),
         tested_(near_.size(), -1) {}
 
-  /// Adds the crossings with one triangle.
-  void add(const std::array<Vec3d, 3>& triangle) {
-    ++number_;
-    for (std::size_t i = 0; i < 3; ++i) blade_.points[i] = quantiser_(triangle[i]);
-    blade_.normal = unit_normal(blade_.points);
-    if (blade_.normal == Vec3d{}) return;
-    blade_.point = quantiser_.position(blade_.points[0]);
-    blade_.margin = margin_;
-    blade_.box = {};
-    for (const Vec3d& p : triangle) blade_.box.add(p);
-    inflate(blade_.box, margin_);
-    search(triangle);
+  void run() {
+    for (const BladeTriangle& triangle : triangles_) {
+      ++number_;
+      blade_ = triangle;
+      search(triangle.corners);
+    }
   }
 
   /// All crossings so far, by link.
@@ -130,20 +128,50 @@ class LinkSearch {
   }
 
  private:
+  /// The triangles that have an area.
+  std::vector<BladeTriangle> prepare(const TriangleMesh& blade) const {
+    std::vector<BladeTriangle> out;
+    for (const auto& indices : blade.triangles) {
+      BladeTriangle t;
+      for (std::size_t i = 0; i < 3; ++i) {
+        t.corners[i] = blade.points[static_cast<std::size_t>(indices[i])];
+        t.points[i] = quantiser_(t.corners[i]);
+        t.box.add(t.corners[i]);
+      }
+      t.normal = unit_normal(t.points);
+      if (t.normal == Vec3d{}) continue;
+      t.point = quantiser_.position(t.points[0]);
+      t.margin = margin_;
+      inflate(t.box, margin_);
+      out.push_back(t);
+    }
+    return out;
+  }
+
+  /// Whether a box can meet the blade; a blade of many triangles is not looked at closely.
+  bool may_meet_blade(const Box3& box) const {
+    constexpr std::size_t kFew = 16;
+    return triangles_.size() > kFew ||
+           std::any_of(triangles_.begin(), triangles_.end(), [&](const BladeTriangle& t) {
+             return box.overlaps(t.box) && t.near_plane(box);
+           });
+  }
+
   /// The leaves whose boxes the blade's box meets; their boxes go to boxes_.
-  std::vector<CellMap> leaves_near(Box3 blade_box) {
+  std::vector<CellMap> leaves_near(std::span<const std::int32_t> numbers,
+                                   std::span<const Vec3d> corners, Box3 blade_box) {
     inflate(blade_box, margin_);
-    const std::vector<std::int32_t> leaves = body_.leaves();
     std::vector<CellMap> near;
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaves[i])];
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(numbers[i])];
+      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
       const CellMap cell{&body_.lattice(), node.corner, 1 << node.size_log2,
-                         corners_.empty() ? nullptr : corners_.data() + 8 * i};
+                         corners.empty() ? nullptr : corners.data() + 8 * i};
       Box3 box = box_of(cell, {0, 0, 0}, cell.side);
       // Parts of links that were cut may reach beyond the cell.
       for (int face = 0; node.size_log2 == 0 && face < 6; ++face)
         if ((node.cut_mask >> face & 1) != 0) box.add(cell.position_at(far_end(node.corner, face)));
-      if (!box.overlaps(blade_box)) continue;
+      if (!box.overlaps(blade_box) || !may_meet_blade(box)) continue;
       near.push_back(cell);
       masks_.push_back(node.size_log2 == 0 ? node.cut_mask : std::uint8_t{0});
       boxes_.push_back(box);
@@ -250,10 +278,10 @@ class LinkSearch {
   }
 
   const LinkedOctree& body_;
-  std::span<const Vec3d> corners_;
   Quantiser quantiser_;
-  double reach_;                     // of the parts of a triangle that are searched at a time, m
-  double margin_;                    // covers the rounding of every box, m
+  double reach_;   // of the parts of a triangle that are searched at a time, m
+  double margin_;  // covers the rounding of every box, m
+  std::vector<BladeTriangle> triangles_;
   std::vector<Box3> boxes_;          // of the leaves near the blade
   std::vector<std::uint8_t> masks_;  // and which links of theirs were cut before
   std::vector<CellMap> near_;
@@ -287,6 +315,26 @@ Box3 bounds_of(const TriangleMesh& blade) {
   return box;
 }
 
+/// The leaves near the blade in the reference state, ascending.
+std::vector<std::int32_t> leaves_at_rest(const LinkedOctree& body, const Box3& blade) {
+  const Lattice& lattice = body.lattice();
+  Vec3i low, high;
+  for (int d = 0; d < 3; ++d) {
+    const auto k = static_cast<std::size_t>(d);
+    // One cell more for links that reach beyond theirs, and one for rounding.
+    const auto cell = [&](double x, int more) {
+      const double at = std::floor((x - lattice.origin[d]) / lattice.spacing) + more;
+      return static_cast<std::int32_t>(std::clamp(at, -1.0, 1.0 * lattice.size[k]));
+    };
+    low[k] = cell(blade.lo[d], -2);
+    high[k] = cell(blade.hi[d], 2);
+  }
+  std::vector<std::int32_t> numbers;
+  body.add_leaves_between(low, high, numbers);
+  if (!std::is_sorted(numbers.begin(), numbers.end())) std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
 /// Each end keeps the nearest of the crossings of one link. A link that was cut before may stand
 /// open: then a crossing counts for the end whose material it is in alone, if it is nearer than
 /// what is recorded.
@@ -315,49 +363,121 @@ bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
          cut.end[1].distance < recorded.end[1].distance;
 }
 
-}  // namespace
-
-CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
-             std::int32_t cut_id) {
-  expects(cut_id > 0, "a blade needs a cut id of at least 1; 0 is the body's own surface");
-  expects(corners.empty() || corners.size() == 8 * body.leaf_count(),
-          "the deformed positions must number eight for each leaf of the body");
-  check_finite(blade, "the blade");
-  CutEvent event;
-  event.cut_id = cut_id;
-  event.cells_before = event.cells_after = body.leaf_count();
-  if (blade.triangles.empty()) return event;
-
-  const Box3 body_box = bounds_of(body, corners), blade_box = bounds_of(blade);
-  const double body_size = largest(body_box.extent()), blade_size = largest(blade_box.extent());
-  expects(blade_size <= kMaxBladeRatio * body_size,
-          text("the blade is ", blade_size, " m large and the body ", body_size,
-               " m: check the units of the blade"));
-  if (!body_box.overlaps(blade_box)) return event;
-
-  LinkSearch search(body, corners, body_box, blade_box);
-  for (const auto& t : blade.triangles)
-    search.add({blade.points[static_cast<std::size_t>(t[0])],
-                blade.points[static_cast<std::size_t>(t[1])],
-                blade.points[static_cast<std::size_t>(t[2])]});
+/// What the blade pass of `leaves` does to the body. Needs  a blade with triangles.
+CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box, std::span<const std::int32_t> numbers,
+                    std::span<const Vec3d> corners, const TriangleMesh& blade, CutEvent event) {
+  LinkSearch search(body, numbers, corners, body_box, blade, bounds_of(blade));
+  search.run();
   const std::vector<Hit> hits = search.take_hits();
 
   // From here on the body changes, and nothing in the input can be wrong any more.
   const Lattice lattice = body.lattice();
+  const std::size_t splits_before = body.splits().size();
   for (std::size_t begin = 0, end = 0; begin < hits.size(); begin = end) {
     const LinkKey key = hits[begin].key;
     while (end < hits.size() && hits[end].key == key) ++end;
     const Vec3i lower = lattice.link_lower(key);
     const int axis = Lattice::link_axis(key);
-    const LinkCut* before = body.record(lower, axis);
+    // The bit is cheaper to look up than that there is no record.
+    const LinkCut* before = body.connected(lower, axis) ? nullptr : body.record(lower, axis);
     const LinkCut record =
-        nearest({hits.data() + begin, end - begin}, lattice.spacing, cut_id, before);
+        nearest({hits.data() + begin, end - begin}, lattice.spacing, event.cut_id, before);
     ++event.links_hit;
     if (before != nullptr && comes_nearer(record, *before)) event.moved.push_back(key);
     if (body.disconnect(lower, axis, record)) event.disconnected.push_back(key);
   }
+  event.split.assign(body.splits().begin() + static_cast<std::ptrdiff_t>(splits_before),
+                     body.splits().end());
   event.cells_after = body.leaf_count();
   return event;
+}
+
+/// Whether the blade can meet the body at all. @throws Error if it makes no sense.
+bool meets(const Box3& body, const TriangleMesh& blade) {
+  check_finite(blade, "the blade");
+  if (blade.triangles.empty()) return false;
+  const Box3 blade_box = bounds_of(blade);
+  const double body_size = largest(body.extent()), blade_size = largest(blade_box.extent());
+  expects(blade_size <= kMaxBladeRatio * body_size,
+          text("the blade is ", blade_size, " m large and the body ", body_size,
+               " m: check the units of the blade"));
+  return body.overlaps(blade_box);
+}
+
+CutEvent begin_event(const LinkedOctree& body, std::int32_t cut_id) {
+  expects(cut_id > 0, "a blade needs a cut id of at least 1; 0 is the body's own surface");
+  CutEvent event;
+  event.cut_id = cut_id;
+  event.cells_before = event.cells_after = body.leaf_count();
+  return event;
+}
+
+}  // namespace
+
+BladeReach::BladeReach(const TriangleMesh& blade, const Vec3d& origin) {
+  constexpr double kRounding = 1e-10;  // the integers of a blade are 2^40 to some times its size
+  constexpr std::size_t kFew = 16;
+  box_ = bounds_of(blade);
+  margin_ = kRounding * (largest(box_.extent()) + largest(box_.lo) + largest(box_.hi));
+  inflate(box_, margin_);
+  box_ = {box_.lo - origin, box_.hi - origin};
+  for (std::size_t t = 0; t < blade.triangles.size() && blade.triangles.size() <= kFew; ++t) {
+    Vec3d p[3];
+    Slab slab;
+    for (std::size_t i = 0; i < 3; ++i) {
+      p[i] = blade.points[static_cast<std::size_t>(blade.triangles[t][i])] - origin;
+      slab.box.add(p[i]);
+    }
+    inflate(slab.box, margin_);
+    const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
+    // A normal of a needle is mostly rounding, and one of zero lets all pass.
+    const double area = norm(n), longest = largest(slab.box.extent());
+    slab.normal = area > 1e-6 * longest * longest ? (1 / area) * n : Vec3d{};
+    slab.point = p[0];
+    slabs_.push_back(slab);
+  }
+}
+
+bool BladeReach::may_meet(Box3 leaf, bool has_cut_links) const {
+  if (has_cut_links) {
+    const Vec3d beyond = kBeyond * leaf.extent();
+    leaf = {leaf.lo - beyond, leaf.hi + beyond};
+  }
+  if (!leaf.overlaps(box_)) return false;
+  return slabs_.empty() || std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& slab) {
+           if (!leaf.overlaps(slab.box)) return false;
+           const Vec3d to_center = 0.5 * leaf.lo + 0.5 * leaf.hi - slab.point;
+           double reach = margin_;
+           for (int d = 0; d < 3; ++d)
+             reach += 0.5001 * std::abs(slab.normal[d]) * (leaf.hi[d] - leaf.lo[d]);
+           return std::abs(dot(slab.normal, to_center)) <= reach;
+         });
+}
+
+CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
+             std::int32_t cut_id) {
+  const CutEvent event = begin_event(body, cut_id);
+  expects(corners.empty() || corners.size() == 8 * body.leaf_count(),
+          "the deformed positions must number eight for each leaf of the body");
+  const Box3 body_box = bounds_of(body, corners);
+  if (!meets(body_box, blade)) return event;
+  std::vector<std::int32_t> numbers;
+  if (corners.empty()) {
+    numbers = leaves_at_rest(body, bounds_of(blade));
+  } else {
+    numbers.resize(body.leaf_count());
+    std::iota(numbers.begin(), numbers.end(), 0);
+  }
+  return cut_leaves(body, body_box, numbers, corners, blade, event);
+}
+
+CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
+                  std::int32_t cut_id) {
+  const CutEvent event = begin_event(body, cut_id);
+  expects(leaves.corners.size() == 8 * leaves.numbers.size(),
+          "the deformed positions must number eight for each leaf near the blade");
+  if (!meets(leaves.bounds, blade)) return event;
+  return cut_leaves(body, leaves.bounds, leaves.numbers, leaves.corners, blade, event);
 }
 
 }  // namespace kerf

@@ -21,10 +21,45 @@ struct CutEvent {
   std::vector<LinkKey> disconnected;  ///< those of them that were connected before, ascending
   std::vector<LinkKey> moved;         ///< those that were cut before, where it passed nearer to an
                                       ///< end than all cuts so far, ascending
+  std::vector<std::int32_t> split;    ///< the number of each leaf that was split, in their order:
+                                      ///< the i-th left its place to its first child and
+                                      ///< appended cells_before + 7 i .. cells_before + 7 i + 6
   std::size_t cells_before = 0;       ///< leaves before and after
   std::size_t cells_after = 0;
   /// Whether the structure of cells and vertices changed; the surface may have moved all the same.
   bool changed() const { return !disconnected.empty() || cells_before != cells_after; }
+};
+
+/// Where the leaves near a blade lie.
+struct DeformedLeaves {
+  Box3 bounds;                        ///< of the whole body, m
+  std::vector<std::int32_t> numbers;  ///< places in body.leaves(), ascending; all that the blade
+                                      ///< may meet, and as many others as one likes
+  std::vector<Vec3d> corners;         ///< eight for each of them, corner x + 2y + 4z, m
+};
+
+/// Where a blade may meet something, rounding included: a quick test that errs on the safe side.
+class BladeReach {
+ public:
+  /// How far links that were cut before may reach beyond their leaf, in its extents; a little more,
+  /// for rounding.
+  static constexpr double kBeyond = 0.51;
+
+  /// Positions that are tested count from `origin`.
+  explicit BladeReach(const TriangleMesh& blade, const Vec3d& origin = {});
+
+  const Box3& box() const { return box_; }
+  /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met.
+  bool may_meet(Box3 leaf, bool has_cut_links) const;
+
+ private:
+  struct Slab {
+    Box3 box;
+    Vec3d normal, point;
+  };
+  Box3 box_;
+  double margin_ = 0;
+  std::vector<Slab> slabs_;  // around triangles; none: too many to look at
 };
 
 /// Cuts `body` with `blade`.
@@ -44,5 +79,8 @@ struct CutEvent {
 ///         million times larger than the body. The body is unchanged after a throw.
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
              std::int32_t cut_id);
+/// The same, from the corners of the leaves near the blade alone.
+CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
+                  std::int32_t cut_id);
 
 }  // namespace kerf

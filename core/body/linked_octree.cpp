@@ -162,7 +162,7 @@ LinkedOctree::LinkedOctree(const Voxels& voxels, int refinement)
     const int axis = Lattice::link_axis(key);
     if (leaf_at(low) >= 0 && leaf_at(shifted(low, axis, 1)) >= 0) disconnect(low, axis, cut);
   }
-  splits_ = 0;
+  number_leaves();
 }
 
 std::int32_t LinkedOctree::append_node(const Vec3i& corner, int size_log2, std::int32_t parent) {
@@ -236,7 +236,7 @@ void LinkedOctree::disconnect_surface(const Voxels& voxels) {
   }
 }
 
-std::vector<std::int32_t> LinkedOctree::leaves() const {
+void LinkedOctree::number_leaves() {
   std::vector<std::pair<std::uint64_t, std::int32_t>> order;
   order.reserve(leaf_count_);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -247,12 +247,45 @@ std::vector<std::int32_t> LinkedOctree::leaves() const {
         static_cast<std::uint64_t>(node.size_log2) << 58 | lattice_.index(node.corner),
         static_cast<std::int32_t>(i));
   }
-  std::sort(order.begin(), order.end());
+  if (!std::is_sorted(order.begin(), order.end())) std::sort(order.begin(), order.end());
 
-  std::vector<std::int32_t> leaves;
-  leaves.reserve(order.size());
-  for (const auto& entry : order) leaves.push_back(entry.second);
-  return leaves;
+  leaves_.reserve(order.size() + order.size() / 4);  // cuts append
+  leaf_number_.reserve(nodes_.size() + nodes_.size() / 4);
+  leaf_number_.assign(nodes_.size(), -1);
+  for (const auto& entry : order) {
+    leaf_number_[static_cast<std::size_t>(entry.second)] =
+        static_cast<std::int32_t>(leaves_.size());
+    leaves_.push_back(entry.second);
+  }
+}
+
+void LinkedOctree::add_leaves_between(const Vec3i& low, const Vec3i& high,
+                                      std::vector<std::int32_t>& numbers) const {
+  Vec3i first, last;
+  for (std::size_t d = 0; d < 3; ++d) {
+    first[d] = std::max(low[d], 0) >> refinement_;
+    last[d] = std::min(high[d], lattice_.size[d] - 1) >> refinement_;
+  }
+  std::vector<std::int32_t> stack;
+  for (Vec3i r = first; r[2] <= last[2]; ++r[2])
+    for (r[1] = first[1]; r[1] <= last[1]; ++r[1])
+      for (r[0] = first[0]; r[0] <= last[0]; ++r[0]) {
+        const std::int32_t root = root_[root_index(r)];
+        if (root >= 0) stack.push_back(root);
+        while (!stack.empty()) {
+          const std::int32_t i = stack.back();
+          stack.pop_back();
+          const Node& node = nodes_[static_cast<std::size_t>(i)];
+          bool touches = node.present != 0;
+          for (std::size_t d = 0; d < 3; ++d)
+            touches = touches && node.corner[d] <= high[d] &&
+                      node.corner[d] + (1 << node.size_log2) > low[d];
+          if (!touches) continue;
+          if (node.first_child < 0) numbers.push_back(leaf_number(i));
+          for (int k = 7; node.first_child >= 0 && k >= 0; --k)
+            stack.push_back(node.first_child + k);
+        }
+      }
 }
 
 std::int32_t LinkedOctree::child_at(std::int32_t node, const Vec3i& c) const {
@@ -263,12 +296,8 @@ std::int32_t LinkedOctree::child_at(std::int32_t node, const Vec3i& c) const {
 
 std::int32_t LinkedOctree::leaf_at(const Vec3i& c) const {
   if (!lattice_.inside(c)) return -1;
-  const auto root =
-      static_cast<std::size_t>(c[0] >> refinement_) +
-      static_cast<std::size_t>(roots_[0]) *
-          (static_cast<std::size_t>(c[1] >> refinement_) +
-           static_cast<std::size_t>(roots_[1]) * static_cast<std::size_t>(c[2] >> refinement_));
-  std::int32_t n = root_[root];
+  std::int32_t n =
+      root_[root_index({c[0] >> refinement_, c[1] >> refinement_, c[2] >> refinement_})];
   if (n < 0) return -1;
   while (nodes_[static_cast<std::size_t>(n)].first_child >= 0) n = child_at(n, c);
   return nodes_[static_cast<std::size_t>(n)].present != 0 ? n : -1;
@@ -289,9 +318,18 @@ const LinkCut* LinkedOctree::record(const Vec3i& c, int axis) const {
 
 /// A leaf larger than a finest cell is wholly inside (rule 1), so that all children are present.
 void LinkedOctree::split(std::int32_t leaf) {
-  append_children(leaf);
+  const std::int32_t first = append_children(leaf);
   leaf_count_ += 7;
-  ++splits_;
+  if (leaves_.empty()) return;
+  const std::int32_t number = std::exchange(leaf_number_[static_cast<std::size_t>(leaf)], -1);
+  splits_.push_back(number);
+  leaf_number_.resize(nodes_.size(), -1);
+  leaves_[static_cast<std::size_t>(number)] = first;
+  leaf_number_[static_cast<std::size_t>(first)] = number;
+  for (std::int32_t child = first + 1; child < first + 8; ++child) {
+    leaf_number_[static_cast<std::size_t>(child)] = static_cast<std::int32_t>(leaves_.size());
+    leaves_.push_back(child);
+  }
 }
 
 /// Splits what rule 2 asks for around nodes that were split.
@@ -338,7 +376,7 @@ bool LinkedOctree::disconnect(const Vec3i& c, int axis, const LinkCut& cut) {
           "only a link between two cells that hold material can be disconnected");
   // Rules 1 and 3: the 3 x 3 cells around each end, in the plane of the shared face.
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  for (int side = 0; side < 2; ++side)
+  for (int side = 0; side < 2 && refinement_ > 0; ++side)
     for (int i = -1; i <= 1; ++i)
       for (int j = -1; j <= 1; ++j)
         refine_to_finest(shifted(shifted(shifted(c, axis, side), u, i), v, j));
@@ -352,7 +390,9 @@ bool LinkedOctree::disconnect(const Vec3i& c, int axis, const LinkCut& cut) {
 std::size_t LinkedOctree::bytes() const {
   // A hash map spends a node with a next pointer on each record, and a pointer on each bucket.
   const std::size_t record = sizeof(std::pair<const LinkKey, LinkCut>) + sizeof(void*);
-  return nodes_.capacity() * sizeof(Node) + root_.capacity() * sizeof(std::int32_t) +
+  return nodes_.capacity() * sizeof(Node) +
+         (root_.capacity() + leaves_.size() + leaf_number_.size() + splits_.capacity()) *
+             sizeof(std::int32_t) +
          records_.size() * record + records_.bucket_count() * sizeof(void*);
 }
 

@@ -47,9 +47,18 @@ class LinkedOctree {
   int refinement() const { return refinement_; }
   const std::vector<Node>& nodes() const { return nodes_; }
 
-  /// Present leaves, ascending by (size, z, y, x) of their corner.
-  std::vector<std::int32_t> leaves() const;
+  /// The nodes that are present leaves. Ascending by (size, z, y, x) of their corner at first; a
+  /// leaf that is split leaves its place to its first child, and the other seven are appended. So a
+  /// place in this list, the number of the leaf, stays that of the cells at one corner for ever.
+  const std::vector<std::int32_t>& leaves() const { return leaves_; }
   std::size_t leaf_count() const { return leaf_count_; }
+  /// The place in leaves() of a node that is a present leaf; -1 for others.
+  std::int32_t leaf_number(std::int32_t node) const {
+    return leaf_number_[static_cast<std::size_t>(node)];
+  }
+  /// Appends the number of every present leaf that touches the box of finest cells [low, high].
+  void add_leaves_between(const Vec3i& low, const Vec3i& high,
+                          std::vector<std::int32_t>& numbers) const;
 
   /// The present leaf that covers finest cell `c`, or -1 (outside the lattice, or no material).
   std::int32_t leaf_at(const Vec3i& c) const;
@@ -70,8 +79,8 @@ class LinkedOctree {
   /// point. Returns whether the link was connected before.
   bool disconnect(const Vec3i& c, int axis, const LinkCut& cut);
 
-  /// Leaves that were split since construction; grows by one for each split.
-  std::size_t splits() const { return splits_; }
+  /// The number of each leaf that was split since construction, in their order.
+  const std::vector<std::int32_t>& splits() const { return splits_; }
 
   std::size_t bytes() const;
 
@@ -82,8 +91,15 @@ class LinkedOctree {
   std::int32_t append_children(std::int32_t node);
   void build(const Voxels& voxels, const Pyramid& pyramid, std::int32_t node);
   void disconnect_surface(const Voxels& voxels);
+  void number_leaves();
   void split(std::int32_t leaf);
   std::int32_t child_at(std::int32_t node, const Vec3i& c) const;
+  std::size_t root_index(const Vec3i& r) const {
+    return static_cast<std::size_t>(r[0]) +
+           static_cast<std::size_t>(roots_[0]) *
+               (static_cast<std::size_t>(r[1]) +
+                static_cast<std::size_t>(roots_[1]) * static_cast<std::size_t>(r[2]));
+  }
   void balance(std::vector<std::int32_t>& split_nodes);
   void mark(const Vec3i& c, int axis);
 
@@ -93,8 +109,10 @@ class LinkedOctree {
   std::vector<std::int32_t> root_;  // dense grid of root nodes, -1: none
   std::vector<Node> nodes_;
   std::unordered_map<LinkKey, LinkCut> records_;
+  std::vector<std::int32_t> leaves_;       // empty during construction
+  std::vector<std::int32_t> leaf_number_;  // per node
   std::size_t leaf_count_ = 0;
-  std::size_t splits_ = 0;
+  std::vector<std::int32_t> splits_;
 };
 
 }  // namespace kerf

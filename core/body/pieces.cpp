@@ -32,15 +32,6 @@ void for_each_linked_pair(const LinkedOctree& body, const std::vector<std::int32
   }
 }
 
-/// The place of each leaf in body.leaves(), by node; -1 for other nodes.
-std::vector<std::int32_t> leaf_order(const LinkedOctree& body,
-                                     const std::vector<std::int32_t>& leaves) {
-  std::vector<std::int32_t> order(body.nodes().size(), -1);
-  for (std::size_t i = 0; i < leaves.size(); ++i)
-    order[static_cast<std::size_t>(leaves[i])] = static_cast<std::int32_t>(i);
-  return order;
-}
-
 std::int32_t find_root(std::vector<std::int32_t>& parent, std::int32_t i) {
   while (parent[static_cast<std::size_t>(i)] != i) {
     std::int32_t& up = parent[static_cast<std::size_t>(i)];
@@ -53,13 +44,12 @@ std::int32_t find_root(std::vector<std::int32_t>& parent, std::int32_t i) {
 }  // namespace
 
 std::vector<LeafLink> leaf_links(const LinkedOctree& body) {
-  const std::vector<std::int32_t> leaves = body.leaves();
-  const std::vector<std::int32_t> order = leaf_order(body, leaves);
+  const std::vector<std::int32_t>& leaves = body.leaves();
   std::vector<LeafLink> found;
   found.reserve(3 * leaves.size());
   std::vector<std::size_t> begin(leaves.size() + 1, 0);
   for_each_linked_pair(body, leaves, [&](std::int32_t a, std::int32_t b, std::uint8_t axis) {
-    found.push_back({order[static_cast<std::size_t>(a)], order[static_cast<std::size_t>(b)], axis});
+    found.push_back({body.leaf_number(a), body.leaf_number(b), axis});
     ++begin[static_cast<std::size_t>(found.back().a) + 1];
   });
 
@@ -76,13 +66,12 @@ std::vector<LeafLink> leaf_links(const LinkedOctree& body) {
 }
 
 std::vector<std::int32_t> label_pieces(const LinkedOctree& body, std::size_t* count) {
-  const std::vector<std::int32_t> leaves = body.leaves();
-  const std::vector<std::int32_t> order = leaf_order(body, leaves);
+  const std::vector<std::int32_t>& leaves = body.leaves();
   std::vector<std::int32_t> parent(leaves.size());
   std::iota(parent.begin(), parent.end(), 0);
   for_each_linked_pair(body, leaves, [&](std::int32_t a, std::int32_t b, std::uint8_t) {
-    const std::int32_t p = find_root(parent, order[static_cast<std::size_t>(a)]);
-    const std::int32_t q = find_root(parent, order[static_cast<std::size_t>(b)]);
+    const std::int32_t p = find_root(parent, body.leaf_number(a));
+    const std::int32_t q = find_root(parent, body.leaf_number(b));
     parent[static_cast<std::size_t>(std::max(p, q))] = std::min(p, q);  // roots are first leaves
   });
 

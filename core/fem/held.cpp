@@ -23,7 +23,7 @@ struct Piece {
 };
 
 std::size_t piece_of(const Level& level, std::span<const std::int32_t> piece, std::int32_t vertex) {
-  return static_cast<std::size_t>(piece[level.incidence[level.incidence_begin[vertex]] / 8]);
+  return static_cast<std::size_t>(piece[level.incidences_of(vertex)[0] / 8]);
 }
 
 std::vector<Piece> measure(const Lattice& lattice, const Level& level,

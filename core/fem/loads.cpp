@@ -2,7 +2,7 @@
 #include "core/fem/loads.hpp"
 
 #include <cmath>
-#include <functional>
+#include <variant>
 
 #include "core/base/error.hpp"
 #include "kernels/transfer.hpp"
@@ -13,24 +13,6 @@ namespace {
 Vec3d cell_center(const Lattice& lattice, const Level& level, std::int32_t cell) {
   const double half = 0.5 * lattice.spacing * (1 << level.size_log2[cell]);
   return lattice.point(level.corner[cell]) + Vec3d{half, half, half};
-}
-
-// Forces on the corners reach the vertices that carry them.
-void add_corner_forces(const Level& level, std::int32_t cell, const Vec3d (&corners)[8],
-                       std::vector<double>& out) {
-  Vec3d slots[8];
-  kernels::fold_transpose(corners, level.fold[cell], slots);
-  for (int i = 0; i < 8; ++i)
-    for (int c = 0; c < 3; ++c)
-      out[3 * static_cast<std::size_t>(level.slots[cell][i]) + c] += slots[i][c];
-}
-
-// A force spread evenly over a cell reaches its corners in equal shares.
-void add_cell_force(const Level& level, std::int32_t cell, const Vec3d& force,
-                    std::vector<double>& out) {
-  Vec3d corners[8];
-  for (Vec3d& corner : corners) corner = 0.125 * force;
-  add_corner_forces(level, cell, corners, out);
 }
 
 // Finest cells of a leaf with their centre in a box, and their shares of its corners. Finest cells,
@@ -59,21 +41,6 @@ struct Covered {
   }
 };
 
-void add_box_force(const Lattice& lattice, const Level& level, const BoxForce& load,
-                   std::vector<double>& out) {
-  double cells = 0;
-  for (std::int32_t c = 0; c < level.cells(); ++c)
-    cells += Covered(lattice, level, c, load.box).cells();
-  expects(cells > 0, "the box of a force holds no centre of a finest cell; enlarge or move it");
-  for (std::int32_t c = 0; c < level.cells(); ++c) {
-    const Covered covered(lattice, level, c, load.box);
-    if (covered.cells() == 0) continue;
-    Vec3d corners[8];
-    for (int i = 0; i < 8; ++i) corners[i] = (covered.corner(i) / cells) * load.force;
-    add_corner_forces(level, c, corners, out);
-  }
-}
-
 Vec3d away_from_axis(const RadialForce& load, const Vec3d& p) {
   const Vec3d axis = (1 / norm(load.axis)) * load.axis;
   const Vec3d d = p - load.point;
@@ -84,11 +51,12 @@ Vec3d away_from_axis(const RadialForce& load, const Vec3d& p) {
 
 }  // namespace
 
-std::vector<double> apply_supports(const Lattice& lattice, const std::vector<Support>& supports,
-                                   Level& level) {
-  std::vector<double> held(3 * level.point.size(), 0.0);
-  for (std::int32_t v = 0; v < level.vertices(); ++v) {
+void apply_supports(const Lattice& lattice, const std::vector<Support>& supports, Level& level,
+                    std::int32_t first, std::vector<double>& held) {
+  held.resize(3 * level.point.size());
+  for (std::int32_t v = first; v < level.vertices(); ++v) {
     level.fixed[v] = 0;
+    for (int c = 0; c < 3; ++c) held[3 * static_cast<std::size_t>(v) + c] = 0;
     const Vec3d p = lattice.point(level.point[v]);
     for (const Support& support : supports) {
       if (!support.box.contains(p)) continue;
@@ -99,28 +67,73 @@ std::vector<double> apply_supports(const Lattice& lattice, const std::vector<Sup
         }
     }
   }
-  return held;
 }
 
-std::vector<double> external_force(const Lattice& lattice, const std::vector<Load>& loads,
-                                   const Hierarchy& hierarchy) {
+ExternalForce::ExternalForce(const Lattice& lattice, const std::vector<Load>& loads,
+                             const Level& level)
+    : lattice_(lattice), loads_(loads), covered_(loads.size(), 0.0) {
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
+    const auto* box = std::get_if<BoxForce>(&loads_[i]);
+    if (box == nullptr) continue;
+    for (std::int32_t c = 0; c < level.cells(); ++c)
+      covered_[i] += Covered(lattice_, level, c, box->box).cells();
+    expects(covered_[i] > 0,
+            "the box of a force holds no centre of a finest cell; enlarge or move it");
+  }
+}
+
+// What one load does to the wanted slots (a bit each) of one cell. A body force is spread evenly
+// over it, and reaches its corners in equal shares.
+void ExternalForce::on_slots(const Hierarchy& hierarchy, std::size_t load, std::int32_t cell,
+                             unsigned wanted, Vec3d (&slots)[8]) const {
+  const Level& level = hierarchy.levels[0];
+  const bool hangs = (level.fold[cell] & 255) != 0;
+  if (hangs) wanted = 255;
+  Vec3d corners[8];
+  Vec3d(&out)[8] = hangs ? corners : slots;
+  if (const auto* box = std::get_if<BoxForce>(&loads_[load])) {
+    const Covered covered(lattice_, level, cell, box->box);
+    const bool none = covered.cells() == 0;
+    for (int i = 0; i < 8; ++i)
+      out[i] = none ? Vec3d{} : (covered.corner(i) / covered_[load]) * box->force;
+  } else {
+    Vec3d force{};
+    if (const auto* gravity = std::get_if<Gravity>(&loads_[load]))
+      force = hierarchy.values[cell].mass * gravity->acceleration;
+    else if (const auto* radial = std::get_if<RadialForce>(&loads_[load]))
+      force = hierarchy.values[cell].mass * radial->strength *
+              away_from_axis(*radial, cell_center(lattice_, level, cell));
+    for (int i = 0; i < 8; ++i)
+      if ((wanted >> i & 1) != 0) out[i] = 0.125 * force;
+  }
+  if (hangs) kernels::fold_transpose(corners, level.fold[cell], slots);
+}
+
+std::vector<double> ExternalForce::on_all(const Hierarchy& hierarchy) const {
   const Level& level = hierarchy.levels[0];
   std::vector<double> out(3 * level.point.size(), 0.0);
-  const auto for_cells = [&](const std::function<Vec3d(std::int32_t)>& force) {
-    for (std::int32_t c = 0; c < level.cells(); ++c) add_cell_force(level, c, force(c), out);
-  };
-  for (const Load& load : loads) {
-    if (const auto* gravity = std::get_if<Gravity>(&load)) {
-      for_cells([&](std::int32_t c) { return hierarchy.values[c].mass * gravity->acceleration; });
-    } else if (const auto* radial = std::get_if<RadialForce>(&load)) {
-      for_cells([&](std::int32_t c) {
-        return hierarchy.values[c].mass * radial->strength *
-               away_from_axis(*radial, cell_center(lattice, level, c));
-      });
-    } else if (const auto* box = std::get_if<BoxForce>(&load)) {
-      add_box_force(lattice, level, *box, out);
+  for (std::size_t load = 0; load < loads_.size(); ++load)
+    for (std::int32_t c = 0; c < level.cells(); ++c) {
+      Vec3d slots[8];
+      on_slots(hierarchy, load, c, 255, slots);
+      for (int i = 0; i < 8; ++i)
+        for (int d = 0; d < 3; ++d)
+          out[3 * static_cast<std::size_t>(level.slots[c][i]) + d] += slots[i][d];
     }
-  }
+  return out;
+}
+
+std::vector<double> ExternalForce::on(const Hierarchy& hierarchy,
+                                      std::span<const std::int32_t> vertices) const {
+  const Level& level = hierarchy.levels[0];
+  std::vector<double> out(3 * vertices.size(), 0.0);
+  for (std::size_t k = 0; k < vertices.size(); ++k)
+    for (std::size_t load = 0; load < loads_.size(); ++load)
+      for (const std::int32_t item : level.incidences_of(vertices[k])) {
+        Vec3d slots[8];
+        on_slots(hierarchy, load, item / 8, 1U << (item % 8), slots);
+        for (int d = 0; d < 3; ++d) out[3 * k + d] += slots[item % 8][d];
+      }
   return out;
 }
 

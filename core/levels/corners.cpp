@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "core/levels/corners.hpp"
 
+#include <bit>
+#include <cmath>
+
+#include "core/base/error.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
@@ -15,32 +19,125 @@ void corner_values(const Level& level, std::int32_t cell, std::span<const double
   kernels::unfold(slots, level.fold[cell], out);
 }
 
-std::vector<double> transfer_values(const Level& before, std::span<const double> values,
-                                    const Level& after, std::span<const std::int32_t> origin) {
-  std::vector<double> out(3 * after.point.size(), 0.0);
-  for (std::int32_t v = 0; v < after.vertices(); ++v) {
+NewVertices new_vertices(const Level& level, const LevelChange& change) {
+  NewVertices out;
+  for (std::int32_t v = change.vertices_before; v < level.vertices(); ++v) {
     // The field is continuous over links, so any cell gives the value; one that has the vertex as
     // its own corner exists, and the first is as good as any.
-    for (std::int32_t k = after.incidence_begin[v]; k < after.incidence_begin[v + 1]; ++k) {
-      const std::int32_t cell = after.incidence[k] / 8;
-      const int slot = after.incidence[k] % 8;
-      if ((after.fold[cell] >> slot) & 1) continue;  // the vertex lies outside this cell
-      const std::int32_t old = origin[cell];
-      Vec3d corners[8];
-      corner_values(before, old, values, corners);
-      const double side = 1 << before.size_log2[old];
-      double t[3];
-      for (int d = 0; d < 3; ++d) t[d] = (after.point[v][d] - before.corner[old][d]) / side;
-      Vec3d sum{};
-      for (int i = 0; i < 8; ++i) {
-        double w = 1;
-        for (int d = 0; d < 3; ++d) w *= ((i >> d) & 1) ? t[d] : 1 - t[d];
-        if (w != 0) sum += w * corners[i];
-      }
-      for (int d = 0; d < 3; ++d) out[3 * static_cast<std::size_t>(v) + d] = sum[d];
+    std::int32_t cell = -1;
+    for (const std::int32_t k : level.incidences_of(v)) {
+      if ((level.fold[k / 8] >> (k % 8) & 1) != 0) continue;  // the vertex lies outside this cell
+      cell = k / 8;
       break;
     }
+    ensures(cell >= 0, "a vertex is no corner of any cell");
+    if (cell >= change.cells_before) cell = change.origin[cell - change.cells_before];
+    const CellBefore was = change.cell_before(level, cell);
+    double fold[8][8], at[8] = {};
+    kernels::fold_weights(was.fold, fold);
+    for (int i = 0; i < 8; ++i) {
+      double w = 1;
+      for (int d = 0; d < 3; ++d) {
+        const double t = 1.0 * (level.point[v][d] - was.corner[d]) / (1 << was.size_log2);
+        w *= ((i >> d) & 1) ? t : 1 - t;
+      }
+      if (w == 0) continue;
+      for (int j = 0; j < 8; ++j) at[j] += w * fold[i][j];
+    }
+    for (int j = 0; j < 8; ++j) {
+      if (at[j] == 0) continue;
+      out.source.push_back(was.slots[j]);
+      out.weight.push_back(at[j]);
+    }
+    out.begin.push_back(static_cast<std::int32_t>(out.source.size()));
   }
+  return out;
+}
+
+std::vector<double> NewVertices::combine(std::span<const double> of_sources) const {
+  std::vector<double> out(3 * (begin.size() - 1), 0.0);
+  for (std::size_t v = 0; v + 1 < begin.size(); ++v)
+    for (std::int32_t k = begin[v]; k < begin[v + 1]; ++k)
+      for (std::size_t d = 0; d < 3; ++d)
+        out[3 * v + d] += weight[k] * of_sources[3 * static_cast<std::size_t>(k) + d];
+  return out;
+}
+
+FindNear::FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
+                   const BladeReach& reach)
+    : level_(hierarchy.levels[0]),
+      spacing_(hierarchy.spacing),
+      displacement_(displacement),
+      reach_(reach),
+      beside_(level_.point.size()) {}
+
+Vec3d FindNear::position(std::int32_t vertex) const {
+  const double* u = displacement_.data() + 3 * static_cast<std::size_t>(vertex);
+  const Vec3i& x = level_.point[vertex];
+  return {x[0] * spacing_ + u[0], x[1] * spacing_ + u[1], x[2] * spacing_ + u[2]};
+}
+
+void FindNear::look_at_vertices(std::int32_t first, std::int32_t last, NearCells& out) {
+  // In locals, because a byte that is written might be any of theirs.
+  const Box3 box = reach_.box();
+  const double h = spacing_;
+  const Vec3i* point = level_.point.data();
+  const double* u = displacement_.data();
+  std::uint8_t* beside = beside_.data();
+  Box3 bounds;
+  double sum = 0;  // finite as long as all are
+  for (std::int32_t v = first; v < last; ++v) {
+    const double* at = u + 3 * static_cast<std::size_t>(v);
+    const Vec3d p{point[v][0] * h + at[0], point[v][1] * h + at[1], point[v][2] * h + at[2]};
+    const int bits = (p.x < box.lo.x ? 1 : 0) | (p.x > box.hi.x ? 2 : 0) |
+                     (p.y < box.lo.y ? 4 : 0) | (p.y > box.hi.y ? 8 : 0) |
+                     (p.z < box.lo.z ? 16 : 0) | (p.z > box.hi.z ? 32 : 0);
+    beside[v] = static_cast<std::uint8_t>(bits);
+    for (int d = 0; d < 3; ++d) {
+      bounds.lo[d] = p[d] < bounds.lo[d] ? p[d] : bounds.lo[d];
+      bounds.hi[d] = p[d] > bounds.hi[d] ? p[d] : bounds.hi[d];
+    }
+    sum += 0 * (p.x + p.y + p.z);
+  }
+  out.bounds.add(bounds);
+  out.finite = out.finite && std::isfinite(sum);
+}
+
+// Whether links of a cell whose vertices all lie beyond one side of the box end there too.
+bool FindNear::is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const {
+  const int side = std::countr_zero(beside), d = side / 2;
+  Box3 along;
+  for (const std::int32_t v : slots) {
+    const double x = level_.point[v][static_cast<std::size_t>(d)] * spacing_ +
+                     displacement_[3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(d)];
+    along.lo.x = std::min(along.lo.x, x);
+    along.hi.x = std::max(along.hi.x, x);
+  }
+  const double beyond = BladeReach::kBeyond * (along.hi.x - along.lo.x);
+  return side % 2 == 0 ? along.hi.x + beyond < reach_.box().lo[d]
+                       : along.lo.x - beyond > reach_.box().hi[d];
+}
+
+// Only finest cells have links that were cut; of the others, each face has one at least.
+void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const {
+  for (std::int32_t c = first; c < last; ++c) {
+    const bool has_cut_links = level_.size_log2[c] == 0 && level_.links_of(c).size() < 6;
+    const std::array<std::int32_t, 8>& slots = level_.slots[c];
+    std::uint8_t beside = 255;
+    for (const std::int32_t v : slots) beside &= beside_[v];
+    if (beside != 0 && (!has_cut_links || is_far(slots, beside))) continue;
+    Box3 box;
+    for (const std::int32_t v : slots) box.add(position(v));
+    if (reach_.may_meet(box, has_cut_links)) out.cells.push_back(c);
+  }
+}
+
+NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
+                     const BladeReach& reach) {
+  FindNear find(hierarchy, displacement, reach);
+  NearCells out;
+  find.look_at_vertices(0, hierarchy.levels[0].vertices(), out);
+  find.look_at_cells(0, hierarchy.levels[0].cells(), out);
   return out;
 }
 

@@ -3,11 +3,15 @@
 // From vertex values to corner values and back, on the host, for level 0.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/body/cut.hpp"
 #include "core/geometry/vec.hpp"
 #include "core/levels/hierarchy.hpp"
+#include "core/levels/update.hpp"
 
 namespace kerf {
 
@@ -15,9 +19,42 @@ namespace kerf {
 void corner_values(const Level& level, std::int32_t cell, std::span<const double> vertex_values,
                    Vec3d (&out)[8]);
 
-/// Vertex values of a refined or cut level, from the corner values of the level before.
-/// origin[c] is the cell of the old level that the new cell c lay in. The field is unchanged.
-std::vector<double> transfer_values(const Level& before, std::span<const double> values,
-                                    const Level& after, std::span<const std::int32_t> origin);
+/// Where new vertices take their values from after a cut, so that the field stays what it was:
+/// vertex k of them is the sum of weight times source over [begin[k], begin[k + 1]).
+struct NewVertices {
+  std::vector<std::int32_t> begin{0}, source;  ///< old vertices
+  std::vector<double> weight;
+
+  /// Shapes  of_sources: three for each of `source`; out: three for each new vertex.
+  std::vector<double> combine(std::span<const double> of_sources) const;
+};
+NewVertices new_vertices(const Level& level, const LevelChange& change);
+
+/// What a blade may meet of the deformed body; positions count from the origin of the lattice.
+struct NearCells {
+  Box3 bounds;                      ///< of all vertices, m
+  bool finite = true;               ///< whether all positions are
+  std::vector<std::int32_t> cells;  ///< ascending: all that may be met, and few others
+};
+/// In two passes, each of which may be shared out: over vertices, then over cells.
+class FindNear {
+ public:
+  FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
+           const BladeReach& reach);
+  void look_at_vertices(std::int32_t first, std::int32_t last, NearCells& out);
+  void look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const;
+
+ private:
+  Vec3d position(std::int32_t vertex) const;
+  bool is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const;
+
+  const Level& level_;
+  double spacing_;
+  std::span<const double> displacement_;
+  const BladeReach& reach_;
+  std::vector<std::uint8_t> beside_;  // per vertex: a bit for each side of the box it lies beyond
+};
+NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
+                     const BladeReach& reach);
 
 }  // namespace kerf

@@ -14,46 +14,69 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/body/lattice.hpp"
 #include "core/body/linked_octree.hpp"
+#include "core/levels/rows.hpp"
 
 namespace kerf {
 
-/// A link between two cells of one level; a is on the low side along axis.
-struct CellLink {
-  std::int32_t a, b;
-  std::uint8_t axis;
-};
-
+/// Arrays grow in place when a blade passes, and numbers stay: nothing is ever merged, so a cell
+/// that is split or falls apart leaves its number to one of its parts, a vertex to one of its own,
+/// and the others are appended (update.hpp). The order of a build is therefore that of the start
+/// alone.
 struct Level {
   static constexpr std::uint8_t kPassed = 8;
 
-  // Cells, ascending by (size, z, y, x).
+  // Cells; built in the order of body.leaves() on level 0, ascending by (size, z, y, x) above.
   std::vector<Vec3i> corner;            ///< low corner, finest lattice
   std::vector<std::uint8_t> size_log2;  ///< side, in finest cells: 1 << size_log2
   std::vector<std::int32_t> parent;     ///< cell of the next level; empty on the coarsest
   std::vector<std::uint8_t> place;      ///< octant in the parent, or kPassed; empty on the coarsest
   std::vector<std::uint16_t> fold;      ///< bits 0-7 hanging corners, bits 8-10 octant
   std::vector<std::array<std::int32_t, 8>> slots;  ///< the eight vertices
-  std::vector<CellLink> links;                     ///< ascending by (a, b)
-  std::vector<std::int32_t> child_begin;  ///< per cell + 1, into children; empty on level 0
-  std::vector<std::int32_t> children;     ///< cells of the previous level, ascending
 
-  // Vertices, ascending by (z, y, x) of their grid point, then by their first cell.
-  std::vector<Vec3i> point;                   ///< finest lattice
-  std::vector<std::uint8_t> fixed;            ///< bit c: component c is held
-  std::vector<std::int32_t> incidence_begin;  ///< per vertex + 1
-  std::vector<std::int32_t> incidence;        ///< 8 cell + slot, ascending
-  std::vector<std::int32_t> colour_begin;     ///< per colour + 1, into colour_order
-  std::vector<std::int32_t> colour_order;     ///< vertices; no two of one colour share a cell
+  // Vertices; built ascending by (z, y, x) of their grid point, then by their first cell.
+  std::vector<Vec3i> point;         ///< finest lattice
+  std::vector<std::uint8_t> fixed;  ///< bit c: component c is held
+
+  // Lists, to be read by the functions below: these arrays lie packed only after a build and
+  // pack().
+  std::vector<std::int32_t> link_begin, linked;
+  std::vector<std::int32_t> child_begin, children;  ///< empty on level 0
+  std::vector<std::int32_t> incidence_begin, incidence;
+  RowState link_rows, child_rows, incidence_rows;
+
+  /// Cells that are linked to one: 8 cell + face, ascending; face 2 axis + side as seen from the
+  /// cell whose list it is, side 1 towards larger coordinates.
+  std::span<const std::int32_t> links_of(std::int32_t cell) const {
+    return row_of(link_begin, linked, link_rows, cell);
+  }
+  /// Cells of the previous level, ascending. Not on level 0.
+  std::span<const std::int32_t> children_of(std::int32_t cell) const {
+    return row_of(child_begin, children, child_rows, cell);
+  }
+  /// 8 cell + slot, ascending.
+  std::span<const std::int32_t> incidences_of(std::int32_t vertex) const {
+    return row_of(incidence_begin, incidence, incidence_rows, vertex);
+  }
+  /// Lists in one piece again: row r of X is X[X_begin[r]] .. X[X_begin[r + 1]]. Linear time.
+  void pack();
 
   std::int32_t cells() const { return static_cast<std::int32_t>(corner.size()); }
   std::int32_t vertices() const { return static_cast<std::int32_t>(point.size()); }
-  int colours() const { return static_cast<int>(colour_begin.size()) - 1; }
   std::size_t bytes() const;
 };
+
+/// A link between two cells of one level; a is on the low side along axis.
+struct CellLink {
+  std::int32_t a, b;
+  std::uint8_t axis;
+};
+/// Every link once, ascending by (a, b).
+std::vector<CellLink> links_of(const Level& level);
 
 /// What the element of a cell of level 0 needs, beside its rotation.
 struct CellValues {
@@ -76,18 +99,29 @@ struct Hierarchy {
   bool lumped_mass = false;
   bool cut = false;  ///< some link between two cells is disconnected
 
+  void pack();  ///< all levels
   std::size_t bytes() const;
 };
 
 /// Level 0 without supports and values: cells in the order of body.leaves().
 Level finest_level(const LinkedOctree& body);
 
-/// Fills fold, slots, vertices, incidences and colours of a level from its cells and links.
+/// The links of a leaf, as in Level::links_of; numbers are places in body.leaves().
+void add_links_of_leaf(const LinkedOctree& body, std::int32_t number,
+                       std::vector<std::int32_t>& out);
+
+/// Fills fold, slots, vertices and incidences of a level from its cells and links.
 /// @throws Error (internal) if some cell would not have exactly eight vertices.
 void build_vertices(Level& level);
 
 /// Builds all coarser levels over levels[0], whose `fixed` is set. A component of a coarse vertex
 /// is held iff every fine component that it would move is.
 void build_coarse_levels(Hierarchy& hierarchy, const HierarchyOptions& options);
+
+/// Whether build_coarse_levels would stop at the levels that the hierarchy has.
+bool has_all_levels(const Hierarchy& hierarchy, const HierarchyOptions& options);
+
+/// Bit 8 i + m: slot i of a child takes something from slot m of its parent.
+std::uint64_t transfer_pattern(std::uint16_t child, std::uint8_t place, std::uint16_t parent);
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/levels/hierarchy.hpp"
@@ -9,6 +10,15 @@
 namespace kerf {
 namespace {
 
+// Calls visit(link) for every link once.
+template <class Visit>
+void for_each_link(const Level& level, const Visit& visit) {
+  for (std::int32_t a = 0; a < level.cells(); ++a)
+    for (const std::int32_t item : level.links_of(a))
+      if ((item & 1) != 0)  // towards the high side
+        visit(CellLink{a, item / 8, static_cast<std::uint8_t>(item % 8 / 2)});
+}
+
 // The places of one level at which cells can meet: the eight corners of every cell, and the 27
 // grid points at half the side of those cells that are linked to smaller ones.
 class Places {
@@ -16,8 +26,8 @@ class Places {
   explicit Places(const Level& level) : level_(level), half_(level.corner.size(), -1) {
     const auto cells = level.cells();
     std::int32_t next = 8 * cells;
-    for (const CellLink& link : level.links) {
-      if (level.size_log2[link.a] == level.size_log2[link.b]) continue;
+    for_each_link(level, [&](const CellLink& link) {
+      if (level.size_log2[link.a] == level.size_log2[link.b]) return;
       const std::int32_t large =
           level.size_log2[link.a] > level.size_log2[link.b] ? link.a : link.b;
       if (half_[large] < 0) {
@@ -25,7 +35,7 @@ class Places {
         next += 27;
         large_.push_back(large);
       }
-    }
+    });
     count_ = static_cast<std::size_t>(next);
   }
 
@@ -110,24 +120,25 @@ std::vector<Component> number_vertices(Level& level, const Places& places, Union
       if (c.master < 0) c.master = large;
     }
 
-  struct Entry {
-    Vec3i point;
-    std::int32_t place;
-  };
-  std::vector<Entry> entries;
+  // Keys of grid points ascend by (z, y, x); lattices stay below 2^21 cells along each axis.
+  std::vector<std::pair<std::uint64_t, std::int32_t>> entries;
   const std::int32_t corners = 8 * level.cells();
-  for (std::int32_t place = 0; place < corners; ++place)
-    if (sets.find(place) == place && component[place].master < 0)
-      entries.push_back({corner_point(level, place / 8, place % 8), place});
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-    for (int d = 2; d >= 0; --d)
-      if (a.point[d] != b.point[d]) return a.point[d] < b.point[d];
-    return a.place < b.place;
-  });
+  entries.reserve(static_cast<std::size_t>(level.cells()) * 5 / 4 + 64);
+  for (std::int32_t place = 0; place < corners; ++place) {
+    if (sets.find(place) != place || component[place].master >= 0) continue;
+    const Vec3i p = corner_point(level, place / 8, place % 8);
+    entries.emplace_back(static_cast<std::uint64_t>(p[2]) << 42 |
+                             static_cast<std::uint64_t>(p[1]) << 21 |
+                             static_cast<std::uint64_t>(p[0]),
+                         place);
+  }
+  std::sort(entries.begin(), entries.end());
+  level.point.reserve(with_room(entries.size()));
   level.point.resize(entries.size());
   for (std::size_t v = 0; v < entries.size(); ++v) {
-    level.point[v] = entries[v].point;
-    component[entries[v].place].vertex = static_cast<std::int32_t>(v);
+    const std::int32_t place = entries[v].second;
+    level.point[v] = corner_point(level, place / 8, place % 8);
+    component[place].vertex = static_cast<std::int32_t>(v);
   }
   return component;
 }
@@ -135,6 +146,8 @@ std::vector<Component> number_vertices(Level& level, const Places& places, Union
 void fill_slots(Level& level, const Places& places, UnionFind& sets,
                 const std::vector<Component>& component) {
   const std::int32_t cells = level.cells();
+  level.fold.reserve(with_room(level.corner.size()));
+  level.slots.reserve(with_room(level.corner.size()));
   level.fold.assign(cells, 0);
   level.slots.resize(cells);
   for (std::int32_t cell = 0; cell < cells; ++cell) {
@@ -193,57 +206,18 @@ void check_masters(const Level& level, const Places& places, UnionFind& sets,
 }
 
 void fill_incidences(Level& level) {
+  level.incidence_rows = {};
+  level.incidence_begin.reserve(with_room(level.point.size()));
   level.incidence_begin.assign(level.point.size() + 1, 0);
   for (const auto& slots : level.slots)
     for (const std::int32_t v : slots) ++level.incidence_begin[v + 1];
   for (std::size_t v = 0; v < level.point.size(); ++v)
     level.incidence_begin[v + 1] += level.incidence_begin[v];
+  level.incidence.reserve(with_room(8 * level.slots.size()));
   level.incidence.resize(8 * level.slots.size());
   std::vector<std::int32_t> next(level.incidence_begin.begin(), level.incidence_begin.end() - 1);
   for (std::int32_t cell = 0; cell < level.cells(); ++cell)
     for (int i = 0; i < 8; ++i) level.incidence[next[level.slots[cell][i]]++] = 8 * cell + i;
-}
-
-// Where all cells have one size, the parity of the grid point: eight colours, however many vertices
-// share a place.
-std::vector<std::uint8_t> colours_by_parity(const Level& level) {
-  std::vector<std::uint8_t> colour(level.point.size());
-  for (std::size_t v = 0; v < colour.size(); ++v)
-    for (int d = 0; d < 3; ++d)
-      colour[v] |= static_cast<std::uint8_t>(((level.point[v][d] >> level.size_log2[0]) & 1) << d);
-  return colour;
-}
-
-// Greedy in vertex order: somewhat more than eight at level jumps.
-std::vector<std::uint8_t> colours_by_greed(const Level& level) {
-  constexpr int kMaxColours = 128;
-  std::vector<std::uint8_t> colour(level.point.size(), kMaxColours);
-  for (std::int32_t v = 0; v < level.vertices(); ++v) {
-    std::uint64_t used[2] = {0, 0};
-    for (std::int32_t k = level.incidence_begin[v]; k < level.incidence_begin[v + 1]; ++k)
-      for (const std::int32_t w : level.slots[level.incidence[k] / 8])
-        if (colour[w] < kMaxColours) used[colour[w] / 64] |= std::uint64_t{1} << (colour[w] % 64);
-    int c = std::countr_one(used[0]);
-    if (c == 64) c = 64 + std::countr_one(used[1]);
-    ensures(c < kMaxColours, "more than 128 colours");
-    colour[v] = static_cast<std::uint8_t>(c);
-  }
-  return colour;
-}
-
-void colour_vertices(Level& level) {
-  const bool one_size = level.size_log2.front() == level.size_log2.back();
-  const std::vector<std::uint8_t> colour =
-      one_size ? colours_by_parity(level) : colours_by_greed(level);
-  std::vector<std::int32_t> count(*std::max_element(colour.begin(), colour.end()) + std::size_t{1},
-                                  0);
-  for (const std::uint8_t c : colour) ++count[c];
-  level.colour_begin.assign(count.size() + 1, 0);
-  for (std::size_t c = 0; c < count.size(); ++c)
-    level.colour_begin[c + 1] = level.colour_begin[c] + count[c];
-  level.colour_order.resize(level.point.size());
-  std::vector<std::int32_t> next(level.colour_begin.begin(), level.colour_begin.end() - 1);
-  for (std::int32_t v = 0; v < level.vertices(); ++v) level.colour_order[next[colour[v]]++] = v;
 }
 
 }  // namespace
@@ -253,13 +227,13 @@ void build_vertices(Level& level) {
   expects(places.count() < (std::size_t{1} << 31),
           "the body has too many cells for 32-bit indices; lower the resolution");
   UnionFind sets(places.count());
-  for (const CellLink& link : level.links) unite_over_link(level, places, link, sets);
+  for_each_link(level, [&](const CellLink& link) { unite_over_link(level, places, link, sets); });
   const std::vector<Component> component = number_vertices(level, places, sets);
   fill_slots(level, places, sets, component);
   check_masters(level, places, sets, component);
+  level.fixed.reserve(with_room(level.point.size()));
   level.fixed.assign(level.point.size(), 0);
   fill_incidences(level);
-  colour_vertices(level);
 }
 
 }  // namespace kerf

@@ -13,8 +13,8 @@ AssembledLevel::AssembledLevel(const Level& level) {
   std::vector<int> near;
   for (std::int32_t v = 0; v < vertices; ++v) {
     near.clear();
-    for (std::int32_t k = level.incidence_begin[v]; k < level.incidence_begin[v + 1]; ++k)
-      for (const std::int32_t w : level.slots[level.incidence[k] / 8])
+    for (const std::int32_t k : level.incidences_of(v))
+      for (const std::int32_t w : level.slots[k / 8])
         if (w >= v) near.push_back(w);
     std::sort(near.begin(), near.end());
     near.erase(std::unique(near.begin(), near.end()), near.end());

@@ -56,20 +56,24 @@ void Surface::rebuild(const LinkedOctree& body, std::vector<GridKey> points) {
 }
 
 void Surface::bind(const LinkedOctree& body) {
-  const std::vector<std::int32_t> leaves = body.leaves();
-  std::vector<std::int32_t> cell_of(body.nodes().size(), -1);
-  for (std::size_t i = 0; i < leaves.size(); ++i)
-    cell_of[static_cast<std::size_t>(leaves[i])] = static_cast<std::int32_t>(i);
   points_.resize(store_.vertex_slots());
-  for (std::size_t v = 0; v < points_.size(); ++v) {
-    points_[v] = {};
-    if (store_.used[v] == 0) continue;
-    const auto leaf = static_cast<std::size_t>(body.leaf_at(store_.finest_cell[v]));
-    const LinkedOctree::Node& node = body.nodes()[leaf];
-    const double side = body.lattice().spacing * (1 << node.size_log2);
-    const Vec3d& x = store_.reference[v];
-    points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner)), cell_of[leaf]};
+  for (const std::int32_t v : store_.take_moved()) bind_vertex(body, v);
+  for (; splits_seen_ < body.splits().size(); ++splits_seen_) {
+    const auto split = in_larger_.extract(body.splits()[splits_seen_]);
+    if (split.empty()) continue;
+    for (const std::int32_t v : split.mapped()) bind_vertex(body, v);
   }
+}
+
+void Surface::bind_vertex(const LinkedOctree& body, std::int32_t v) {
+  points_[v] = {};
+  if (store_.used[v] == 0) return;
+  const std::int32_t leaf = body.leaf_at(store_.finest_cell[v]);
+  const LinkedOctree::Node& node = body.nodes()[leaf];
+  const double side = body.lattice().spacing * (1 << node.size_log2);
+  const Vec3d& x = store_.reference[v];
+  points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner)), body.leaf_number(leaf)};
+  if (node.size_log2 > 0) in_larger_[points_[v].cell].push_back(v);
 }
 
 SurfaceView Surface::view() const {

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "core/body/cut.hpp"
@@ -39,8 +40,10 @@ class Surface {
 
   /// Rebuilds the dual cells that a cut touched. `body` is the body after the cut.
   void update(const LinkedOctree& body, const CutEvent& event);
-  /// Finds the cells of level 0, in the order of body.leaves(), that vertices move with. A vertex
+  /// Finds the cells of level 0, by their place in body.leaves(), that vertices move with. A vertex
   /// belongs to the nearest finest cell of its own component, and moves with the leaf around it.
+  /// Looks only at vertices that changed since the last call, and at those in leaves that were
+  /// split.
   void bind(const LinkedOctree& body);
 
   const TriangleStore& store() const { return store_; }
@@ -54,10 +57,14 @@ class Surface {
 
  private:
   void rebuild(const LinkedOctree& body, std::vector<std::uint64_t> points);
+  void bind_vertex(const LinkedOctree& body, std::int32_t v);
 
   std::unique_ptr<SurfaceBuilder> builder_;
   TriangleStore store_;
   std::vector<BoundPoint> points_;
+  std::size_t splits_seen_ = 0;
+  /// Vertices that were bound to a leaf larger than a finest cell, by its number.
+  std::unordered_map<std::int32_t, std::vector<std::int32_t>> in_larger_;
 };
 
 }  // namespace kerf

@@ -44,12 +44,14 @@ std::int32_t TriangleStore::add_vertex(std::uint64_t key, const Vertex& vertex) 
 void TriangleStore::set_vertex(std::int32_t v, const Vertex& vertex) {
   reference[v] = vertex.reference;
   finest_cell[v] = vertex.cell;
+  moved_.push_back(v);
 }
 
 void TriangleStore::remove_vertex(std::int32_t v) {
   ensures(used[v] != 0 && first_corner[v] < 0, "a vertex is removed under its triangles");
   used[v] = 0;
   mark(v);  // its normals are to be freed
+  moved_.push_back(v);
   free_vertices_.push_back(v);
 }
 

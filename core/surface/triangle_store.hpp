@@ -18,6 +18,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/geometry/vec.hpp"
@@ -48,6 +49,8 @@ class TriangleStore {
 
   /// Hands out normals to the vertices whose triangles changed since the last call.
   void finish();
+  /// The vertices that were added, set or removed since the last call; some of them twice.
+  std::vector<std::int32_t> take_moved() { return std::exchange(moved_, {}); }
 
   std::size_t vertex_slots() const { return reference.size(); }
   std::size_t triangle_slots() const { return triangles.size(); }
@@ -81,7 +84,7 @@ class TriangleStore {
   std::vector<std::int32_t> next_normal_;   // per normal
   std::size_t normals_ = 0;
   std::vector<std::int32_t> free_vertices_, free_triangles_, free_normals_;
-  std::vector<std::int32_t> changed_;
+  std::vector<std::int32_t> changed_, moved_;
   std::vector<std::uint8_t> is_changed_;
   /// Of the vertex at hand: its corners, and the smooth part of its group that each belongs to.
   struct Around {

@@ -10,6 +10,7 @@
 #include <string>
 #include <tuple>
 
+#include "core/levels/colours.hpp"
 #include "core/solve/cycle.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/problem.hpp"
@@ -203,7 +204,7 @@ TEST_P(Operators, GaussSeidelIsASequentialSweepInTheOrderOfColours) {
       if (f.norm() == 0) continue;
       for (const SweepOrder order : {SweepOrder::forward, SweepOrder::backward}) {
         const Level& level = p.level(l);
-        std::vector<std::int32_t> vertices = level.colour_order;
+        std::vector<std::int32_t> vertices = colour_vertices(level).order;
         if (order == SweepOrder::backward) std::reverse(vertices.begin(), vertices.end());
         Vector u = start;
         for (int k = 0; k < 2; ++k) oracle::gauss_seidel(A[l], D, vertices, smoother.omega, f, u);

@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "core/levels/colours.hpp"
 #include "core/levels/corners.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "tests/oracle/levels_oracle.hpp"
@@ -87,11 +88,12 @@ void expect_two_to_one(const Grid& grid) {
 
 void expect_valid_colours(const Level& level) {
   std::vector<int> colour(level.point.size(), -1);
-  for (int c = 0; c < level.colours(); ++c) {
-    ASSERT_LT(level.colour_begin[c], level.colour_begin[c + 1]) << "an empty colour";
-    for (std::int32_t k = level.colour_begin[c]; k < level.colour_begin[c + 1]; ++k) {
-      ASSERT_EQ(colour[level.colour_order[k]], -1) << "a vertex of two colours";
-      colour[level.colour_order[k]] = c;
+  const Colours colours = colour_vertices(level);
+  for (int c = 0; c < colours.count(); ++c) {
+    ASSERT_LT(colours.begin[c], colours.begin[c + 1]) << "an empty colour";
+    for (std::int32_t k = colours.begin[c]; k < colours.begin[c + 1]; ++k) {
+      ASSERT_EQ(colour[colours.order[k]], -1) << "a vertex of two colours";
+      colour[colours.order[k]] = c;
     }
   }
   for (const auto& slots : level.slots)
@@ -107,26 +109,25 @@ void expect_indices_agree(const Hierarchy& h) {
     std::set<std::array<std::int32_t, 2>> expected, found;
     for (std::int32_t c = 0; c < level.cells(); ++c)
       for (std::int32_t i = 0; i < 8; ++i) expected.insert({level.slots[c][i], 8 * c + i});
-    for (std::int32_t v = 0; v < level.vertices(); ++v)
-      for (std::int32_t k = level.incidence_begin[v]; k < level.incidence_begin[v + 1]; ++k) {
-        found.insert({v, level.incidence[k]});
-        if (k > level.incidence_begin[v]) {
-          ASSERT_LT(level.incidence[k - 1], level.incidence[k]);
-        }
-      }
+    std::size_t entries = 0;
+    for (std::int32_t v = 0; v < level.vertices(); ++v) {
+      const auto row = level.incidences_of(v);
+      ASSERT_TRUE(std::is_sorted(row.begin(), row.end()));
+      for (const std::int32_t k : row) found.insert({v, k});
+      entries += row.size();
+    }
     ASSERT_EQ(found, expected);
-    ASSERT_EQ(level.incidence.size(), expected.size());
+    ASSERT_EQ(entries, expected.size());
     if (l == 0) continue;
     const Level& fine = h.levels[l - 1];
     std::vector<int> seen(fine.corner.size(), 0);
     for (std::int32_t c = 0; c < level.cells(); ++c) {
-      ASSERT_LT(level.child_begin[c], level.child_begin[c + 1]);
-      for (std::int32_t k = level.child_begin[c]; k < level.child_begin[c + 1]; ++k) {
-        ASSERT_EQ(fine.parent[level.children[k]], c);
-        ++seen[level.children[k]];
-        if (k > level.child_begin[c]) {
-          ASSERT_LT(level.children[k - 1], level.children[k]);
-        }
+      const auto row = level.children_of(c);
+      ASSERT_FALSE(row.empty());
+      ASSERT_TRUE(std::is_sorted(row.begin(), row.end()));
+      for (const std::int32_t child : row) {
+        ASSERT_EQ(fine.parent[child], c);
+        ++seen[child];
       }
     }
     ASSERT_EQ(std::count(seen.begin(), seen.end(), 1), static_cast<int>(seen.size()));
@@ -216,7 +217,7 @@ TEST(Levels, OfRandomCutsAreThoseOfTheLinks) {
 TEST(Levels, UniformBodiesNeedEightColours) {
   for (const char* name : {"uniform", "floating", "bar"}) {
     const Hierarchy h = hierarchy_of(test::scene(name), 8);
-    for (const Level& level : h.levels) EXPECT_EQ(level.colours(), 8) << name;
+    for (const Level& level : h.levels) EXPECT_EQ(colour_vertices(level).count(), 8) << name;
   }
 }
 
@@ -224,9 +225,9 @@ TEST(Levels, UniformBodiesNeedEightColours) {
 
 using Links = std::vector<std::array<int, 3>>;  // {a, b, axis}
 
-Links links_of(const Level& level) {
+Links link_list(const Level& level) {
   Links out;
-  for (const CellLink& link : level.links) out.push_back({link.a, link.b, link.axis});
+  for (const CellLink& link : links_of(level)) out.push_back({link.a, link.b, link.axis});
   return out;
 }
 
@@ -260,17 +261,17 @@ TEST(LevelsByHand, SlabWithAnL) {
   EXPECT_EQ(h.levels[2].parent, (std::vector<std::int32_t>{0, 0, 0}));
   EXPECT_EQ(h.levels[1].corner[1], h.levels[1].corner[2]);  // B and B' share their place
   EXPECT_EQ(h.levels[2].corner[0], h.levels[2].corner[1]);
-  EXPECT_EQ(links_of(h.levels[1]), (Links{{0, 1, 0},     // A-B  over 1-2
-                                          {0, 4, 1},     // A-D
-                                          {1, 3, 0},     // B-C  over 3-4
-                                          {1, 5, 1},     // B-E  over 8-14
-                                          {2, 3, 0},     // B'-C over 9-10
-                                          {2, 6, 1},     // B'-E' over 9-15
-                                          {3, 7, 1},     // C-F
-                                          {4, 5, 0},     // D-E
-                                          {6, 7, 0}}));  // E'-F over 15-16; E has no link to E', F
-  EXPECT_EQ(links_of(h.levels[2]), (Links{{0, 2, 0}, {1, 2, 0}}));
-  EXPECT_TRUE(h.levels[3].links.empty());
+  EXPECT_EQ(link_list(h.levels[1]), (Links{{0, 1, 0},     // A-B  over 1-2
+                                           {0, 4, 1},     // A-D
+                                           {1, 3, 0},     // B-C  over 3-4
+                                           {1, 5, 1},     // B-E  over 8-14
+                                           {2, 3, 0},     // B'-C over 9-10
+                                           {2, 6, 1},     // B'-E' over 9-15
+                                           {3, 7, 1},     // C-F
+                                           {4, 5, 0},     // D-E
+                                           {6, 7, 0}}));  // E'-F over 15-16; E has no link to E', F
+  EXPECT_EQ(link_list(h.levels[2]), (Links{{0, 2, 0}, {1, 2, 0}}));
+  EXPECT_TRUE(link_list(h.levels[3]).empty());
 
   // Of 7 x 5 grid points in a plane, those on the L have two vertices, but not its tip (5, 1):
   // (3, 4), (3, 3), (3, 2), the bend (3, 1), and (4, 1). Two planes.
@@ -288,7 +289,7 @@ TEST(LevelsByHand, SlabWithAnLMergedByPlace) {
   ASSERT_EQ(h.levels.size(), 4u);
   EXPECT_EQ(h.levels[1].cells(), 6);
   EXPECT_EQ(h.levels[1].vertices(), 24);
-  EXPECT_EQ(h.levels[1].links.size(), 7u);
+  EXPECT_EQ(link_list(h.levels[1]).size(), 7u);
   EXPECT_EQ(h.levels[2].cells(), 2);
 }
 
@@ -339,9 +340,9 @@ TEST(LevelsByHand, OctreeWithAnL) {
   // bz = 0, and 4 each for bz = 1, 2. Along z: 2 x 3 in each of four; in the last 3 to the left
   // parts, 1 to a right part where the foot is open, and 6 above.
   std::array<int, 3> count{};
-  for (const CellLink& link : one.links) ++count[link.axis];
+  for (const CellLink& link : links_of(one)) ++count[link.axis];
   EXPECT_EQ(count, (std::array<int, 3>{36, 34, 34}));
-  EXPECT_EQ(h.levels[3].links.size(), 1u);
+  EXPECT_EQ(link_list(h.levels[3]).size(), 1u);
 }
 
 // ---- Supports -----------------------------------------------------------------------------------

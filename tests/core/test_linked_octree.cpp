@@ -61,7 +61,7 @@ TEST(LinkedOctree, HoldsItsInvariantsWhenBuilt) {
       const LinkedOctree body(voxels, refinement);
 
       EXPECT_TRUE(invariants_hold(body, voxels.label)) << "refinement " << refinement;
-      EXPECT_EQ(body.splits(), 0u);
+      EXPECT_EQ(body.splits().size(), 0u);
     }
 }
 
@@ -87,7 +87,7 @@ TEST(LinkedOctree, CutSplitsWhatBalanceAndItsNeighbourhoodAskFor) {
 
   EXPECT_EQ(sizes(body),
             (std::map<int, std::size_t>{{0, finest + 32}, {1, middle + 18 * 8 - 4}, {2, 64 - 18}}));
-  EXPECT_EQ(body.splits(), 18u + 4u);
+  EXPECT_EQ(body.splits().size(), 18u + 4u);
   EXPECT_TRUE(invariants_hold(body, voxels.label));
 }
 
@@ -212,7 +212,7 @@ TEST(LinkedOctree, RefinementAtOnePlaceKeepsTheBalance) {
   body.refine_to_finest({-1, 31, 31});
 
   EXPECT_TRUE(invariants_hold(body, voxels.label));
-  EXPECT_EQ(body.leaf_count(), before + 7 * body.splits());
+  EXPECT_EQ(body.leaf_count(), before + 7 * body.splits().size());
 }
 
 TEST(LinkedOctree, RejectsBadInputWithTheRemedy) {

@@ -180,8 +180,9 @@ Structure reordered(const Structure& from, const Level& level,
   }
   for (const auto& join : from.joins) to.joins.insert({at[join[0]], at[join[1]], join[2]});
   Joins have;
-  for (const CellLink& link : level.links) have.insert({link.a, link.b, link.axis});
-  if (have != to.joins || have.size() != level.links.size()) wrong("links", number, 0);
+  const std::vector<CellLink> links = links_of(level);
+  for (const CellLink& link : links) have.insert({link.a, link.b, link.axis});
+  if (have != to.joins || have.size() != links.size()) wrong("links", number, 0);
   return to;
 }
 

@@ -116,9 +116,11 @@ double lowest_after_load_steps(const Beam& beam, int steps) {
   LinkedOctree body(voxelise(*setup.body.solid, lattice), 0);
   cut(body, {}, sweep(beam.notch()), 1);
   Hierarchy hierarchy = test::one_material(body, setup.material);
-  apply_supports(lattice, setup.supports, hierarchy.levels[0]);
+  std::vector<double> held;
+  apply_supports(lattice, setup.supports, hierarchy.levels[0], 0, held);
   build_coarse_levels(hierarchy, {});
-  const std::vector<double> load = external_force(lattice, setup.loads, hierarchy);
+  const std::vector<double> load =
+      ExternalForce(lattice, setup.loads, hierarchy.levels[0]).on_all(hierarchy);
   const auto backend = test::cpu();
   LinearSolver solver(*backend, setup.solver);
   const StateVectors state{backend->add_vector(), -1, -1, backend->add_vector()};

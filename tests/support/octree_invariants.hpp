@@ -100,7 +100,9 @@ inline ::testing::AssertionResult tree_holds(const PaintedLeaves& p,
   for (std::size_t i = 0; i < p.leaves.size(); ++i) {
     const auto& n = p.node(static_cast<std::int32_t>(i));
     volume += std::size_t{1} << (3 * n.size_log2);
-    if (i == 0) continue;
+    if (p.octree.leaf_number(p.leaves[i]) != static_cast<std::int32_t>(i))
+      return broken("leaf_number()", n.corner);
+    if (i == 0 || !p.octree.splits().empty()) continue;
     const auto& m = p.node(static_cast<std::int32_t>(i) - 1);
     const auto key = [](const LinkedOctree::Node& a) {
       return std::array{static_cast<int>(a.size_log2), a.corner[2], a.corner[1], a.corner[0]};
