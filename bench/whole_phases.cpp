@@ -53,7 +53,8 @@ void prepare_cut(Trial& t) {
 void run_cut_topology(Trial& t) {
   const Hierarchy& levels = t.structure->hierarchy();
   const Vec3d origin = t.octree->lattice().origin;
-  const NearCells near = near_cells(levels, t.bent_values, BladeReach(t.body.blade(), origin));
+  const NearCells near =
+      near_cells(levels, t.bent_values, BladeReach(t.body.blade(), origin), t.structure->opened());
   std::vector<double> of_slots;
   for (const std::int32_t cell : near.cells)
     for (const std::int32_t v : levels.levels[0].slots[cell])

@@ -37,7 +37,7 @@ void Backend::read_some(int, int, std::span<const std::int32_t>, std::span<doubl
   ensures(false, kNoUpdates);
 }
 
-NearCells Backend::find_near(int, const BladeReach&) const {
+NearCells Backend::find_near(int, const BladeReach&, std::span<const std::int32_t>) const {
   ensures(false, kNoUpdates);
   return {};
 }

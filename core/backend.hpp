@@ -139,7 +139,8 @@ class Backend {
   virtual void read_some(int level, int x, std::span<const std::int32_t> vertices,
                          std::span<double> values) const;
   /// What a blade may meet: as near_cells in core/levels/corners.hpp.
-  virtual NearCells find_near(int displacement, const BladeReach& reach) const;
+  virtual NearCells find_near(int displacement, const BladeReach& reach,
+                              std::span<const std::int32_t> opened) const;
 };
 
 }  // namespace kerf

@@ -252,10 +252,10 @@ DeformedLeaves Simulation::Impl::leaves_near(const TriangleMesh& blade) const {
   NearCells near;
   std::vector<double> all, of_slots;
   if (backend->can_update()) {
-    near = backend->find_near(state.displacement, reach);
+    near = backend->find_near(state.displacement, reach, structure->opened());
   } else {
     all = read_vector(state.displacement);
-    near = near_cells(hierarchy(), all, reach);
+    near = near_cells(hierarchy(), all, reach, structure->opened());
   }
   expects(near.finite && std::isfinite(norm(near.bounds.extent())),
           "the deformed positions of the body are not finite: the simulation has diverged");

@@ -2,6 +2,7 @@
 #include "core/structure.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace kerf {
@@ -17,6 +18,16 @@ Hierarchy start_hierarchy(const SimulationSetup& setup, const LinkedOctree& body
   return out;
 }
 
+// Brings more cells into an ascending list.
+void merge_into(std::vector<std::int32_t>& list, std::vector<std::int32_t> more) {
+  std::sort(more.begin(), more.end());
+  std::vector<std::int32_t> out;
+  out.reserve(list.size() + more.size());
+  std::set_union(list.begin(), list.end(), more.begin(), more.end(), std::back_inserter(out));
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  list = std::move(out);
+}
+
 }  // namespace
 
 Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body)
@@ -29,6 +40,7 @@ Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body)
   for (std::int32_t c = 0; c < level.cells(); ++c) set_values(body, c);
   held_.reserve(3 * with_room(level.point.size()));
   labels_.build(level);
+  merge_into(opened_, opened_cells(body));
   hold_again(body);
   build_coarse_levels(hierarchy_, options());
 }
@@ -74,6 +86,9 @@ bool Structure::update(const LinkedOctree& body, const CutEvent& event) {
   for (const std::int32_t cell : change.cells) set_values(body, cell);
   for (std::int32_t c = change.cells_before; c < level.cells(); ++c) set_values(body, c);
   labels_.update(body, event, level, change);
+  std::vector<std::int32_t> ends;
+  for (const LinkKey key : event.disconnected) add_ends(body, key, ends);
+  merge_into(opened_, std::move(ends));
   // Static mode solves many times a step, so that a pass over all vertices costs nothing there.
   std::vector<std::int32_t> held;
   if (setup_->time.mode == TimeMode::statics)

@@ -37,6 +37,8 @@ class Structure {
   std::size_t pieces() const { return labels_.count(); }
   std::vector<std::int32_t> piece_of_cells() const { return labels_.by_first_cell(); }
   const ExternalForce& external() const { return external_; }
+  /// Cells of level 0 with a link to another cell that was cut, ascending.
+  const std::vector<std::int32_t>& opened() const { return opened_; }
 
   /// Vertices on which the external force may differ from before the last update.
   std::vector<std::int32_t> reloaded() const;
@@ -50,7 +52,8 @@ class Structure {
   /// Crumbs stay where they are: at `displacement`, three for each vertex.
   void hold_crumbs_at(const std::vector<double>& displacement);
   std::size_t bytes() const {
-    return hierarchy_.bytes() + labels_.bytes() + held_.size() * sizeof(double);
+    return hierarchy_.bytes() + labels_.bytes() + held_.size() * sizeof(double) +
+           opened_.size() * sizeof(std::int32_t);
   }
   /// Warnings since the last call.
   std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
@@ -64,6 +67,7 @@ class Structure {
   Hierarchy hierarchy_;
   LevelUpdater updater_;
   PieceLabels labels_;
+  std::vector<std::int32_t> opened_;
   std::vector<double> held_;  // displacement of held components, three for each vertex
   FrozenCrumbs crumbs_;
   std::vector<std::string> warnings_;

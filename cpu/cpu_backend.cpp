@@ -89,7 +89,8 @@ class CpuBackend final : public Backend {
                   std::span<const double> values) override;
   void read_some(int level, int x, std::span<const std::int32_t> vertices,
                  std::span<double> values) const override;
-  NearCells find_near(int displacement, const BladeReach& reach) const override;
+  NearCells find_near(int displacement, const BladeReach& reach,
+                      std::span<const std::int32_t> opened) const override;
 
  private:
   // Calls body(i) for i in [0, count), the range cut into one slab a thread. Below `worth` items,
@@ -563,7 +564,8 @@ void CpuBackend::read_some(int level, int x, std::span<const std::int32_t> verti
     values[k] = from[3 * static_cast<std::size_t>(vertices[k / 3]) + k % 3];
 }
 
-NearCells CpuBackend::find_near(int displacement, const BladeReach& reach) const {
+NearCells CpuBackend::find_near(int displacement, const BladeReach& reach,
+                                std::span<const std::int32_t> opened) const {
   constexpr std::int32_t kChunk = 8192;
   FindNear find(*hierarchy_, levels_[0].vectors[displacement], reach);
   NearCells out;
@@ -584,6 +586,7 @@ NearCells CpuBackend::find_near(int displacement, const BladeReach& reach) const
   in_chunks(levels_[0].cells(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
     find.look_at_cells(first, last, part);
   });
+  find.look_at_opened(opened, out);
   return out;
 }
 

@@ -396,4 +396,19 @@ std::size_t LinkedOctree::bytes() const {
          records_.size() * record + records_.bucket_count() * sizeof(void*);
 }
 
+void add_ends(const LinkedOctree& body, LinkKey link, std::vector<std::int32_t>& numbers) {
+  const Vec3i low = body.lattice().link_lower(link);
+  const std::int32_t a = body.leaf_at(low);
+  const std::int32_t b = body.leaf_at(shifted(low, Lattice::link_axis(link), 1));
+  if (a < 0 || b < 0) return;
+  numbers.push_back(body.leaf_number(a));
+  numbers.push_back(body.leaf_number(b));
+}
+
+std::vector<std::int32_t> opened_cells(const LinkedOctree& body) {
+  std::vector<std::int32_t> numbers;
+  for (const auto& [key, record] : body.records()) add_ends(body, key, numbers);
+  return numbers;
+}
+
 }  // namespace kerf

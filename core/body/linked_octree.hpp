@@ -115,4 +115,9 @@ class LinkedOctree {
   std::vector<std::int32_t> splits_;
 };
 
+/// Appends the numbers of the two leaves at the ends of a link, if both hold material.
+void add_ends(const LinkedOctree& body, LinkKey link, std::vector<std::int32_t>& numbers);
+/// The leaves at the ends of disconnected links between two leaves, in no order.
+std::vector<std::int32_t> opened_cells(const LinkedOctree& body);
+
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/levels/corners.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -118,26 +119,43 @@ bool FindNear::is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t bes
                        : along.lo.x - beyond > reach_.box().hi[d];
 }
 
-// Only finest cells have links that were cut; of the others, each face has one at least.
+// The sides of the box beyond which all vertices of a cell lie.
+std::uint8_t FindNear::sides_beyond(std::int32_t cell) const {
+  std::uint8_t beside = 255;
+  for (const std::int32_t v : level_.slots[cell]) beside &= beside_[v];
+  return beside;
+}
+
 void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const {
   for (std::int32_t c = first; c < last; ++c) {
-    const bool has_cut_links = level_.size_log2[c] == 0 && level_.links_of(c).size() < 6;
-    const std::array<std::int32_t, 8>& slots = level_.slots[c];
-    std::uint8_t beside = 255;
-    for (const std::int32_t v : slots) beside &= beside_[v];
-    if (beside != 0 && (!has_cut_links || is_far(slots, beside))) continue;
+    if (sides_beyond(c) != 0) continue;
     Box3 box;
-    for (const std::int32_t v : slots) box.add(position(v));
-    if (reach_.may_meet(box, has_cut_links)) out.cells.push_back(c);
+    for (const std::int32_t v : level_.slots[c]) box.add(position(v));
+    if (reach_.may_meet(box, false)) out.cells.push_back(c);
   }
 }
 
+void FindNear::look_at_opened(std::span<const std::int32_t> cells, NearCells& out) const {
+  const std::size_t found = out.cells.size();
+  for (const std::int32_t c : cells) {
+    const std::uint8_t beside = sides_beyond(c);
+    if (beside != 0 && is_far(level_.slots[c], beside)) continue;
+    Box3 box;
+    for (const std::int32_t v : level_.slots[c]) box.add(position(v));
+    if (reach_.may_meet(box, true)) out.cells.push_back(c);
+  }
+  if (out.cells.size() == found) return;
+  std::sort(out.cells.begin(), out.cells.end());
+  out.cells.erase(std::unique(out.cells.begin(), out.cells.end()), out.cells.end());
+}
+
 NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
-                     const BladeReach& reach) {
+                     const BladeReach& reach, std::span<const std::int32_t> opened) {
   FindNear find(hierarchy, displacement, reach);
   NearCells out;
   find.look_at_vertices(0, hierarchy.levels[0].vertices(), out);
   find.look_at_cells(0, hierarchy.levels[0].cells(), out);
+  find.look_at_opened(opened, out);
   return out;
 }
 

@@ -36,16 +36,20 @@ struct NearCells {
   bool finite = true;               ///< whether all positions are
   std::vector<std::int32_t> cells;  ///< ascending: all that may be met, and few others
 };
-/// In two passes, each of which may be shared out: over vertices, then over cells.
+/// In two passes, each of which may be shared out: over vertices, then over cells; and, apart from
+/// both, over those few whose links to other cells were cut, since these may reach beyond the cell.
 class FindNear {
  public:
   FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
            const BladeReach& reach);
   void look_at_vertices(std::int32_t first, std::int32_t last, NearCells& out);
   void look_at_cells(std::int32_t first, std::int32_t last, NearCells& out) const;
+  /// At last.
+  void look_at_opened(std::span<const std::int32_t> cells, NearCells& out) const;
 
  private:
   Vec3d position(std::int32_t vertex) const;
+  std::uint8_t sides_beyond(std::int32_t cell) const;
   bool is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const;
 
   const Level& level_;
@@ -54,7 +58,8 @@ class FindNear {
   const BladeReach& reach_;
   std::vector<std::uint8_t> beside_;  // per vertex: a bit for each side of the box it lies beyond
 };
+/// `opened`: cells that have a link to another cell that was cut.
 NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,
-                     const BladeReach& reach);
+                     const BladeReach& reach, std::span<const std::int32_t> opened);
 
 }  // namespace kerf

@@ -36,12 +36,7 @@ void PieceLabels::update(const LinkedOctree& body, const CutEvent& event, const 
   for (const std::int32_t origin : change.origin) piece_.push_back(piece_[origin]);
   if (owner_.size() < piece_.size()) owner_.resize(piece_.capacity(), -1);
   std::vector<std::int32_t> ends;
-  for (const LinkKey key : event.disconnected) {
-    Vec3i c = body.lattice().link_lower(key);
-    ends.push_back(body.leaf_number(body.leaf_at(c)));
-    ++c[static_cast<std::size_t>(Lattice::link_axis(key))];
-    ends.push_back(body.leaf_number(body.leaf_at(c)));
-  }
+  for (const LinkKey key : event.disconnected) add_ends(body, key, ends);
   start(ends, finest);
   grow_until_known(finest);
   for (const Part& part : parts_) {

@@ -54,12 +54,12 @@ Cells split_cells(const LinkedOctree& body, const CutEvent& event, Level& level,
 void cut_links(const LinkedOctree& body, const CutEvent& event, Level& level,
                std::vector<Touched::Faces>& relinked) {
   Rows rows(level.link_begin, level.linked, level.link_rows);
+  Cells ends;
   for (const LinkKey key : event.disconnected) {
-    Vec3i c = body.lattice().link_lower(key);
     const int axis = Lattice::link_axis(key);
-    const std::int32_t a = body.leaf_number(body.leaf_at(c));
-    ++c[static_cast<std::size_t>(axis)];
-    const std::int32_t b = body.leaf_number(body.leaf_at(c));
+    ends.clear();
+    add_ends(body, key, ends);
+    const std::int32_t a = ends[0], b = ends[1];
     if (rows.remove(a, 8 * b + 2 * axis + 1))
       relinked.push_back({a, static_cast<std::uint8_t>(2 << (2 * axis))});
     if (rows.remove(b, 8 * a + 2 * axis))

@@ -90,7 +90,9 @@ CutEvent cut_deformed(LinkedOctree& body, Hierarchy& levels, const TriangleMesh&
   const Vec3d origin = body.lattice().origin;
   levels.spacing = body.lattice().spacing;
   const std::vector<double> u = random_displacement(body, level, dice);
-  const NearCells near = near_cells(levels, u, BladeReach(blade, origin));
+  std::vector<std::int32_t> opened = opened_cells(body);
+  std::sort(opened.begin(), opened.end());
+  const NearCells near = near_cells(levels, u, BladeReach(blade, origin), opened);
   std::vector<double> of_slots;
   for (const std::int32_t c : near.cells)
     for (const std::int32_t v : level.slots[c])
