@@ -16,6 +16,7 @@
 #include "core/solve/sparse_cholesky.hpp"
 #include "core/solve/spectrum.hpp"
 #include "cpu/level_store.hpp"
+#include "cpu/near_loops.hpp"
 #include "cpu/surface_loops.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/relax.hpp"
@@ -566,28 +567,7 @@ void CpuBackend::read_some(int level, int x, std::span<const std::int32_t> verti
 
 NearCells CpuBackend::find_near(int displacement, const BladeReach& reach,
                                 std::span<const std::int32_t> opened) const {
-  constexpr std::int32_t kChunk = 8192;
-  FindNear find(*hierarchy_, levels_[0].vectors[displacement], reach);
-  NearCells out;
-  const auto in_chunks = [&](std::int32_t count, const auto& look) {
-    std::vector<NearCells> found((count + kChunk - 1) / kChunk);
-    parallel(
-        static_cast<std::int32_t>(found.size()),
-        [&](std::int32_t i) { look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]); }, 2);
-    for (const NearCells& part : found) {
-      out.finite = out.finite && part.finite;
-      out.bounds.add(part.bounds);
-      out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
-    }
-  };
-  in_chunks(levels_[0].vertices(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
-    find.look_at_vertices(first, last, part);
-  });
-  in_chunks(levels_[0].cells(), [&](std::int32_t first, std::int32_t last, NearCells& part) {
-    find.look_at_cells(first, last, part);
-  });
-  find.look_at_opened(opened, out);
-  return out;
+  return cpu::find_near(*hierarchy_, levels_[0].vectors[displacement], reach, opened, threads_);
 }
 
 }  // namespace

@@ -17,8 +17,9 @@ namespace kerf {
 namespace cpu {
 
 template <class S>
-FastBackend<S>::FastBackend(int threads)
+FastBackend<S>::FastBackend(int threads, bool updates)
     : threads_(threads > 0 ? threads : omp_get_max_threads()),
+      updates_(updates),
       coarsest_factor_(CholeskyEngine::simplicial) {
   constexpr int kMaxThreads = 1024;
   expects(threads >= 0 && threads <= kMaxThreads,
@@ -483,8 +484,9 @@ template class FastBackend<double>;
 }  // namespace cpu
 
 std::unique_ptr<Backend> make_fast_backend(const FastOptions& options) {
-  if (options.single_cycle) return std::make_unique<cpu::FastBackend<float>>(options.threads);
-  return std::make_unique<cpu::FastBackend<double>>(options.threads);
+  if (options.single_cycle)
+    return std::make_unique<cpu::FastBackend<float>>(options.threads, options.updates);
+  return std::make_unique<cpu::FastBackend<double>>(options.threads, options.updates);
 }
 
 }  // namespace kerf

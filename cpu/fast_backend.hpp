@@ -13,6 +13,7 @@ struct FastOptions {
   int threads = 0;            ///< 0: all that OpenMP offers
   bool single_cycle = false;  ///< vectors and matrices of the cycle in float; what is added on
                               ///< level 0 (displacements, residuals, forces) stays double
+  bool updates = true;        ///< false: loads anew after each cut, for comparison
 };
 
 /// The same bits for any number of threads. Smooths by Chebyshev only; the reference backend

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cpu/fast_state.hpp"
+#include "cpu/near_loops.hpp"
 #include "cpu/surface_loops.hpp"
 
 namespace kerf::cpu {
@@ -442,32 +443,11 @@ void FastBackend<S>::read_some(int level, int x, std::span<const std::int32_t> v
 }
 
 template <class S>
-NearCells FastBackend<S>::find_near(int displacement, const BladeReach& reach) const {
+NearCells FastBackend<S>::find_near(int displacement, const BladeReach& reach,
+                                    std::span<const std::int32_t> opened) const {
   std::vector<double> values(3 * levels_[0].patched.packed.size());
   read(0, displacement, values);
-  constexpr std::int32_t kChunk = 8192;
-  FindNear find(*hierarchy_, values, reach);
-  NearCells out;
-  const auto in_chunks = [&](std::int32_t count, const auto& look) {
-    std::vector<NearCells> found((count + kChunk - 1) / kChunk);
-    parallel(static_cast<std::int32_t>(found.size()), 2, [&](std::int32_t i) {
-      look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]);
-    });
-    for (const NearCells& part : found) {
-      out.finite = out.finite && part.finite;
-      out.bounds.add(part.bounds);
-      out.cells.insert(out.cells.end(), part.cells.begin(), part.cells.end());
-    }
-  };
-  in_chunks(static_cast<std::int32_t>(levels_[0].patched.packed.size()),
-            [&](std::int32_t first, std::int32_t last, NearCells& part) {
-              find.look_at_vertices(first, last, part);
-            });
-  in_chunks(static_cast<std::int32_t>(levels_[0].patched.lane.size()),
-            [&](std::int32_t first, std::int32_t last, NearCells& part) {
-              find.look_at_cells(first, last, part);
-            });
-  return out;
+  return cpu::find_near(*hierarchy_, values, reach, opened, threads_);
 }
 
 template class FastBackend<float>;

@@ -84,13 +84,13 @@ struct FastLevel {
 template <class S>
 class FastBackend final : public Backend {
  public:
-  explicit FastBackend(int threads);  ///< 0: all that OpenMP offers
+  FastBackend(int threads, bool updates);  ///< threads 0: all that OpenMP offers
 
   const char* name() const noexcept override { return "cpu"; }
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;
-  bool can_update() const noexcept override { return true; }
+  bool can_update() const noexcept override { return updates_; }
   void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override {
     expects(options.chebyshev,
@@ -141,7 +141,8 @@ class FastBackend final : public Backend {
                   std::span<const double> values) override;
   void read_some(int level, int x, std::span<const std::int32_t> vertices,
                  std::span<double> values) const override;
-  NearCells find_near(int displacement, const BladeReach& reach) const override;
+  NearCells find_near(int displacement, const BladeReach& reach,
+                      std::span<const std::int32_t> opened) const override;
 
  private:
   template <class Body>
@@ -195,6 +196,7 @@ class FastBackend final : public Backend {
   }
 
   int threads_;
+  bool updates_;
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   OperatorScale scale_;

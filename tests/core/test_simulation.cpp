@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "cpu/fast_backend.hpp"
 #include "tests/support/blades.hpp"
 #include "tests/support/physics.hpp"
 
@@ -195,11 +196,14 @@ TEST(Simulation, UpdatesAndLoadsGiveTheSameBits) {
       }
       Simulation updated(setup, make_cpu_backend({1, 0, true}));
       Simulation loaded(setup, make_cpu_backend({1, 0, false}));
+      Simulation fast_updated(setup, make_fast_backend({2, refinement == 1, true}));
+      Simulation fast_loaded(setup, make_fast_backend({1, refinement == 1, false}));
       while (!updated.finished()) {
-        updated.step();
-        loaded.step();
+        for (Simulation* s : {&updated, &loaded, &fast_updated, &fast_loaded}) s->step();
         ASSERT_EQ(updated.state_hash(), loaded.state_hash());
+        ASSERT_EQ(fast_updated.state_hash(), fast_loaded.state_hash());
       }
+      EXPECT_EQ(fast_updated.links_cut(), updated.links_cut());
       EXPECT_GT(updated.links_cut(), 20u);
       EXPECT_EQ(updated.pieces(), loaded.pieces());
       EXPECT_GT(updated.pieces(), 1u);
