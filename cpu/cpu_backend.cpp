@@ -172,12 +172,12 @@ void CpuBackend::fit_to_levels() {
     store.solution_is_zero = false;
     store.colours = {};
     for (auto& vector : store.vectors)
-      vector.resize(3 * static_cast<std::size_t>(store.vertices()), 0.0);
-    store.products.resize(8 * static_cast<std::size_t>(store.cells()));
-    store.inverse_diagonal.resize(store.vertices());
+      resize_with_room(vector, 3 * static_cast<std::size_t>(store.vertices()));
+    resize_with_room(store.products, 8 * static_cast<std::size_t>(store.cells()));
+    resize_with_room(store.inverse_diagonal, store.vertices());
     if (l > 0)
-      store.matrices.resize(
-          kernels::tiled_size(static_cast<std::size_t>(store.cells()), kEntries, tile_log2_));
+      resize_with_room(store.matrices, kernels::tiled_size(static_cast<std::size_t>(store.cells()),
+                                                           kEntries, tile_log2_));
   }
   coarsest_ = std::make_unique<AssembledLevel>(*levels_.back().level);
   coarsest_factor_.analyse(*coarsest_);

@@ -33,10 +33,11 @@ void folded_matrix(const LevelStore& store, std::int32_t cell, double (&packed)[
 
 }  // namespace
 
+// Room that is reserved and was never written takes no memory.
 std::size_t LevelStore::bytes() const {
-  std::size_t sum = matrices.capacity() * sizeof(double) +
-                    inverse_diagonal.capacity() * sizeof(Sym) + products.capacity() * sizeof(Vec);
-  for (const auto& vector : vectors) sum += vector.capacity() * sizeof(double);
+  std::size_t sum = matrices.size() * sizeof(double) + inverse_diagonal.size() * sizeof(Sym) +
+                    products.size() * sizeof(Vec);
+  for (const auto& vector : vectors) sum += vector.size() * sizeof(double);
   return sum;
 }
 
