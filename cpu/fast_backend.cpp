@@ -347,7 +347,10 @@ void FastBackend<S>::coarsen(int fine) {
   const PatchedLevel& packed = to.patched;
   const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
   to.matrices.allocate(packed, !coarsest, scale_.mass != 0);
-  parallel(static_cast<std::int32_t>(packed.groups()), kWorthGroups, [&](std::int32_t g) {
+  const auto groups = static_cast<std::int32_t>(packed.groups());
+  // General cells cost many times as much as others, and lie together.
+#pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
+  for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     const bool passed = packed.kind[group] == kPassed;
     for_packs<S>([&](int first) {
@@ -361,7 +364,7 @@ void FastBackend<S>::coarsen(int fine) {
         merge_stored(from.matrices, children, passed, scale_.mass != 0, out);
       to.matrices.store(group, first, out);
     });
-  });
+  }
 }
 
 template <class S>
