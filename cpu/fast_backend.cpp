@@ -352,16 +352,17 @@ void FastBackend<S>::coarsen(int fine) {
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
-    const bool passed = packed.kind[group] == kPassed;
+    const std::uint16_t kind = packed.kind[group];
+    const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
       P out[kEntries];
-      if (packed.kind[group] == kGeneral)
+      if (kind == kGeneral)
         merge_general(fine, group, first, out);
       else if (fine == 0)
         merge_finest(from.patched, values_of<S>(), scale_, children, passed, out);
       else
-        merge_stored(from.matrices, children, passed, scale_.mass != 0, out);
+        merge_stored(from.matrices, children, passed, to.matrices.with_translations(group), out);
       to.matrices.store(group, first, out);
     });
   }

@@ -533,10 +533,10 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
   }
 }
 
-/// Matrices by modes of parents whose children are stored, none of them held.
+/// Matrices by modes of parents whose children are stored.
 template <class S>
 void merge_stored(const StoredMatrices<S>& from, const std::int32_t* children, bool passed,
-                  bool with_mass, Pack<S> (&out)[kEntries]) {
+                  bool with_translations, Pack<S> (&out)[kEntries]) {
   using P = Pack<S>;
   const auto lanes_of = [&](int octant, std::int32_t(&lanes)[P::kLanes]) {
     bool any = false;
@@ -561,7 +561,7 @@ void merge_stored(const StoredMatrices<S>& from, const std::int32_t* children, b
     from.gather(lanes, scratch[octant & 1]);
     return static_cast<const P*>(scratch[octant & 1]);
   };
-  if (with_mass)
+  if (with_translations)
     kernels::coarsen_modes<true, P>(child, present, static_cast<P*>(out));
   else
     kernels::coarsen_modes<false, P>(child, present, static_cast<P*>(out));

@@ -307,7 +307,9 @@ std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const Patched
       twice = twice || (octants & bit) != 0;
       octants |= bit;
     }
-    if (out.held[c] != 0 || twice) kind_of[c] = kGeneral;
+    const bool masks = out.held[c] != 0 && finer.children.empty();  // children of level 0
+    if (out.held[c] != 0) kind_of[c] = kind_of[c] == kPassed ? kHeldPassed : kHeldMerged;
+    if (masks || twice) kind_of[c] = kGeneral;
   }
   return kind_of;
 }

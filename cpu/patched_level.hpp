@@ -40,7 +40,10 @@ struct SparseWeights {
 enum StoredKind : std::uint16_t {
   kMerged,  ///< from children without held components, one an octant
   kPassed,  ///< from one cell of the same place and size, without held components
-  kGeneral  ///< some cell of level 0 below has a held component, or two children have one octant
+  // Where some cell of level 0 below has a held component:
+  kHeldMerged,  ///< from children above level 0, one an octant
+  kHeldPassed,  ///< from one cell above level 0
+  kGeneral      ///< from cells of level 0, or two children have one octant
 };
 
 /// How the points of a group lie.

@@ -67,9 +67,9 @@ class StoredMatrices {
     traits_.clear();
     std::size_t plain = 0, codes = 0;
     for (std::size_t g = 0; g < level.groups(); ++g) {
-      const bool general = level.kind[g] == kGeneral;
-      const bool is_coded = coded && std::is_same_v<S, float> && !general;
-      const bool full = with_mass || general;
+      const bool held = level.kind[g] >= kHeldMerged;
+      const bool is_coded = coded && std::is_same_v<S, float> && !held;
+      const bool full = with_mass || held;
       traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0)));
       std::size_t& size = is_coded ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
