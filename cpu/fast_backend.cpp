@@ -330,8 +330,8 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
       if (cells[k] < 0) continue;
       const auto children = coarse.children_of(cells[k]);
       if (n >= children.size()) continue;
-      child[k] = children[n];
       any = true;
+      if (levels_[fine].patched.held[children[n]] != kWhollyHeld) child[k] = children[n];
     }
     if (!any) break;
     add_general_children(levels_[fine], fine == 0, child, out);

@@ -283,15 +283,22 @@ std::vector<std::uint16_t> number_kinds(const Hierarchy& hierarchy, PatchedLevel
 
 void find_held(const PatchedLevel* finer, PatchedLevel& out) {
   const Level& level = *out.level;
-  out.held.assign(level.corner.size(), 0);
-  for (std::int32_t c = 0; c < level.cells(); ++c)
+  out.held.assign(level.corner.size(), kFree);
+  for (std::int32_t c = 0; c < level.cells(); ++c) {
+    bool partly = false, wholly = true;
     if (finer == nullptr) {
-      for (const std::int32_t v : level.slots[c])
-        out.held[c] = static_cast<std::uint8_t>(out.held[c] | level.fixed[v]);
+      for (const std::int32_t v : level.slots[c]) {
+        partly = partly || level.fixed[v] != 0;
+        wholly = wholly && level.fixed[v] == 7;
+      }
     } else {
-      for (const std::int32_t child : level.children_of(c))
-        out.held[c] = static_cast<std::uint8_t>(out.held[c] | finer->held[child]);
+      for (const std::int32_t child : level.children_of(c)) {
+        partly = partly || finer->held[child] == kPartlyHeld;
+        wholly = wholly && finer->held[child] == kWhollyHeld;
+      }
     }
+    out.held[c] = wholly ? kWhollyHeld : partly ? kPartlyHeld : kFree;
+  }
 }
 
 std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const PatchedLevel& out) {
@@ -307,8 +314,9 @@ std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const Patched
       twice = twice || (octants & bit) != 0;
       octants |= bit;
     }
-    const bool masks = out.held[c] != 0 && finer.children.empty();  // children of level 0
-    if (out.held[c] != 0) kind_of[c] = kind_of[c] == kPassed ? kHeldPassed : kHeldMerged;
+    const bool held = out.held[c] == kPartlyHeld;
+    const bool masks = held && finer.children.empty();  // children of level 0
+    if (held) kind_of[c] = kind_of[c] == kPassed ? kHeldPassed : kHeldMerged;
     if (masks || twice) kind_of[c] = kGeneral;
   }
   return kind_of;
@@ -321,6 +329,7 @@ void place_children(const PatchedLevel& finer, PatchedLevel& out) {
     const std::int32_t c = out.cell[lane];
     if (c < 0) continue;
     for (const std::int32_t child : level.children_of(c)) {
+      if (finer.held[child] == kWhollyHeld) continue;
       const std::size_t octant = finer.level->place[child] % 8;  // kPassed: 0
       out.children[8 * kGroup * (lane / kGroup) + kGroup * octant + lane % kGroup] =
           finer.lane[child];

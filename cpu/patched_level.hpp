@@ -40,11 +40,15 @@ struct SparseWeights {
 enum StoredKind : std::uint16_t {
   kMerged,  ///< from children without held components, one an octant
   kPassed,  ///< from one cell of the same place and size, without held components
-  // Where some cell of level 0 below has a held component:
+  // Where some cell of level 0 below is partly held:
   kHeldMerged,  ///< from children above level 0, one an octant
   kHeldPassed,  ///< from one cell above level 0
   kGeneral      ///< from cells of level 0, or two children have one octant
 };
+
+/// Whether components of the vertices of a cell are held. A wholly held cell takes no part in any
+/// product, so its matrix is zero to the levels above.
+enum HeldCell : std::uint8_t { kFree, kPartlyHeld, kWhollyHeld };
 
 /// How the points of a group lie.
 enum RowKind : std::uint8_t {
@@ -97,9 +101,9 @@ struct PatchedLevel {
 
   SparseWeights prolong;                // rows: packed vertices; columns: of the next level
   SparseWeights restrict_;              // rows: packed vertices of the next level
-  std::vector<std::uint8_t> held;       // per cell: it, or some cell below, has a held component
+  std::vector<std::uint8_t> held;       // per cell: HeldCell, of it or of the cells below
   std::vector<std::int32_t> children;   // [group][octant][8], above level 0: lanes of the level
-                                        // before, -1: none; one that passed at octant 0
+                                        // before, -1: none, or wholly held; passed: octant 0
 
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }

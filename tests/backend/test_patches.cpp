@@ -166,8 +166,12 @@ TEST(Patches, MergeOneChildAnOctantOrGoTheGeneralWay) {
         std::size_t found = 0;
         for (std::size_t o = 0; o < 8; ++o)
           found += all[l].children[64 * (lane / kGroup) + kGroup * o + lane % kGroup] >= 0;
-        EXPECT_EQ(found, all[l].level->children_of(c).size());
-        EXPECT_EQ(all[l].held[c] != 0, all[l].kind[lane / kGroup] >= cpu::kHeldMerged);
+        std::size_t expected = 0;
+        for (const std::int32_t child : all[l].level->children_of(c))
+          expected += all[l - 1].held[child] != cpu::kWhollyHeld;
+        EXPECT_EQ(found, expected);
+        EXPECT_EQ(all[l].held[c] == cpu::kPartlyHeld,
+                  all[l].kind[lane / kGroup] >= cpu::kHeldMerged);
       }
   }
 }
