@@ -70,7 +70,6 @@ class Backend {
 
   // Values.
   virtual void set_operator(const OperatorScale& scale) = 0;
-  virtual OperatorScale operator_scale() const noexcept = 0;
   /// Level 0: R of every cell from the displacements, warm-started from the last R.
   virtual void rotate_cells(int displacement) = 0;
   /// R of every cell of level 0 as a unit quaternion, four doubles a cell: w x y z.
@@ -79,6 +78,8 @@ class Backend {
   virtual void coarsen(int fine) = 0;   ///< matrices of fine + 1 from fine
   virtual void prepare(int level) = 0;  ///< diagonal blocks, and the bound for Chebyshev
   virtual void factor_coarsest() = 0;   ///< throws Error (bad_input) if a piece is not held
+  /// Whether there is a factor, of this structure and operator; perhaps of older rotations.
+  virtual bool has_factor() const noexcept = 0;
   /// Lower triangle of the matrix of a cell over its slots, 300 doubles (kernels/layout.hpp).
   virtual void read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const = 0;
   /// Upper end of the smoother's range: an estimate from above of max eig(D^-1 A).

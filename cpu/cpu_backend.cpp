@@ -51,7 +51,6 @@ class CpuBackend final : public Backend {
   void set_smoother(const SmootherOptions& options) override { smoother_ = options; }
   int add_vector() override;
 
-  OperatorScale operator_scale() const noexcept override { return finest_.scale; }
   void set_operator(const OperatorScale& scale) override;
   void rotate_cells(int displacement) override;
   void read_rotations(std::span<double> out) const override;
@@ -59,6 +58,7 @@ class CpuBackend final : public Backend {
   void coarsen(int fine) override;
   void prepare(int level) override;
   void factor_coarsest() override;
+  bool has_factor() const noexcept override { return factored_; }
   void read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const override;
   double spectral_bound(int level) const override { return levels_[level].bound; }
 
@@ -128,6 +128,7 @@ class CpuBackend final : public Backend {
   std::vector<Vec> faces_;  // of the surface: area normals
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
+  bool factored_ = false;
 };
 
 std::size_t CpuBackend::bytes() const {
@@ -181,6 +182,7 @@ void CpuBackend::fit_to_levels() {
   }
   coarsest_ = std::make_unique<AssembledLevel>(*levels_.back().level);
   coarsest_factor_.analyse(*coarsest_);
+  factored_ = false;
 }
 
 void CpuBackend::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
@@ -198,8 +200,10 @@ int CpuBackend::add_vector() {
 }
 
 void CpuBackend::set_operator(const OperatorScale& scale) {
-  if (scale.stiffness != finest_.scale.stiffness || scale.mass != finest_.scale.mass)
+  if (scale.stiffness != finest_.scale.stiffness || scale.mass != finest_.scale.mass) {
     for (LevelStore& store : levels_) store.bound = 0;
+    factored_ = false;
+  }
   finest_.scale = scale;
 }
 
@@ -278,8 +282,9 @@ void CpuBackend::factor_coarsest() {
     std::copy_n(packed, kEntries, out.data());
   });
   if (levels_.size() > 1) coarsest_->strengthen_diagonal(AssembledLevel::kShare);
+  factored_ = coarsest_factor_.factor(*coarsest_);
   expects(
-      coarsest_factor_.factor(*coarsest_),
+      factored_,
       "the system matrix is not positive definite: in static mode some part of the body can move "
       "freely and needs a [[support]]; otherwise sizes, moduli or the time step are out of range");
 }

@@ -96,6 +96,7 @@ template <class S>
 void FastBackend<S>::load_coarsest() {
   coarsest_ = std::make_unique<AssembledLevel>(hierarchy_->levels.back());
   coarsest_factor_.analyse(*coarsest_);
+  factored_ = false;
 }
 
 template <class S>
@@ -174,8 +175,10 @@ int FastBackend<S>::add_vector() {
 
 template <class S>
 void FastBackend<S>::set_operator(const OperatorScale& scale) {
-  if (scale.stiffness != scale_.stiffness || scale.mass != scale_.mass)
+  if (scale.stiffness != scale_.stiffness || scale.mass != scale_.mass) {
     for (FastLevel<S>& level : levels_) level.bound = 0;
+    factored_ = false;
+  }
   scale_ = scale;
 }
 
@@ -469,12 +472,14 @@ template <class S>
 void FastBackend<S>::factor_coarsest() {
   constexpr double kGrowth = 100, kMost = std::is_same_v<S, double> ? 0 : 1e-6;
   const int last = static_cast<int>(levels_.size()) - 1;
+  factored_ = false;
   for (double share = AssembledLevel::kShare;; share *= kGrowth) {
     coarsest_->assemble(
         hierarchy_->levels.back(),
         [&](std::int32_t cell, std::span<double> out) { read_cell_matrix(last, cell, out); });
     if (last > 0) coarsest_->strengthen_diagonal(share);
-    if (coarsest_factor_.factor(*coarsest_)) return;
+    factored_ = coarsest_factor_.factor(*coarsest_);
+    if (factored_) return;
     expects(last > 0 && share < kMost,
             "the system matrix is not positive definite: in static mode some part of the body can "
             "move freely and needs a [[support]]; otherwise sizes, moduli or the time step are out "

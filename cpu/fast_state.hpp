@@ -100,13 +100,13 @@ class FastBackend final : public Backend {
   int add_vector() override;
 
   void set_operator(const OperatorScale& scale) override;
-  OperatorScale operator_scale() const noexcept override { return scale_; }
   void rotate_cells(int displacement) override;
   void read_rotations(std::span<double> out) const override;
   void write_rotations(std::span<const double> in) override;
   void coarsen(int fine) override;
   void prepare(int level) override;
   void factor_coarsest() override;
+  bool has_factor() const noexcept override { return factored_; }
   void read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const override;
   double spectral_bound(int level) const override { return levels_[level].bound; }
 
@@ -211,6 +211,7 @@ class FastBackend final : public Backend {
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
+  bool factored_ = false;
 };
 
 template <class S>

@@ -59,7 +59,7 @@ void LinearSolver::refresh() {
   backend_.prepare(0);
   if (setup_.method == SolverMethod::cg_jacobi) return;
   const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
-  const bool factors = factor_is_due();
+  const bool factors = factor_due_ || !backend_.has_factor();
   for (int level = 0; level < last; ++level) {
     if (level + 1 == last && !factors) break;  // its matrices serve the factor alone
     backend_.coarsen(level);
@@ -69,16 +69,7 @@ void LinearSolver::refresh() {
   backend_.factor_coarsest();
   ++times_.factors;
   factor_due_ = false;
-  factor_scale_ = backend_.operator_scale();
   decades_with_new_ = 0;
-}
-
-bool LinearSolver::factor_is_due() const {
-  constexpr double kAlike = 0.05;
-  const OperatorScale now = backend_.operator_scale();
-  const auto differs = [](double a, double b) { return std::abs(a - b) > kAlike * std::abs(b); };
-  return factor_due_ || differs(now.stiffness, factor_scale_.stiffness) ||
-         differs(now.mass, factor_scale_.mass);
 }
 
 // With a factor of older rotations the coarsest correction is off, and cycles contract less.

@@ -56,7 +56,6 @@ class LinearSolver {
   double true_residual(int b, int x);  // leaves b - A x in kRight
   void precondition(bool jacobi);
 
-  bool factor_is_due() const;
   void watch_factor(const SolveStats& stats, double before);
 
   Backend& backend_;
@@ -69,7 +68,6 @@ class LinearSolver {
   int residual_ = -1;                  // the true one, or the recursion of conjugate gradients
   int direction_ = -1, product_ = -1;  // of conjugate gradients
   bool factor_due_ = true;
-  OperatorScale factor_scale_;     // of the operator that was factored
   double decades_with_new_ = 0;    // a cycle, of the first solve after it
   SolverTimes times_;
   Progress progress_;
