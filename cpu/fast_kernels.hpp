@@ -509,6 +509,8 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
                   Pack<S> (&out)[kEntries]) {
   using P = Pack<S>;
   const std::uint64_t materials = materials_of<S>(level, children);
+  if (materials == 0)  // all children are wholly held
+    for (P& entry : out) entry = P{};
   bool first = true;
   for (std::size_t m = 0; m < values.materials.size(); ++m) {
     if (((materials >> (m % 64)) & 1) == 0) continue;
