@@ -94,8 +94,8 @@ class Backend {
   virtual void apply(int level, int in, int out) = 0;  ///< out = A in
   virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
 
-  // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here said
-  // with the operations above.
+  // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here
+  // said with the operations above.
   /// x.y and x.z.
   virtual std::array<double, 2> dots(int x, int y, int z);
   /// d = z + beta d and q = A d; returns d.q and d.r.

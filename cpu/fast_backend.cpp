@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time, and what
-// follows a sum (residual, step of Chebyshev) is done while it is in registers.
+// Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time, and
+// what follows a sum (residual, step of Chebyshev) is done while it is in registers.
 #include "cpu/fast_backend.hpp"
 
 #include <omp.h>
@@ -116,7 +116,7 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   load_coarsest();
 }
 
-/// `from` in other numbers; what is new is zero.
+/// `vector` in other numbers; what is new is zero.
 template <class T>
 void renumber(const std::vector<std::int32_t>& before, const PatchedLevel& now,
               std::vector<T>& vector) {
@@ -150,13 +150,12 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
   start_values(hierarchy, now, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, now, single_);
   const LevelChange& finest = change.levels[0];
-  const auto place = [](std::size_t lane) { return 4 * kGroup * (lane / kGroup) + lane % kGroup; };
   for (std::size_t c = 0; c < now.lane.size(); ++c) {
     const auto cells_before = static_cast<std::size_t>(finest.cells_before);
     const std::size_t origin =
         c < cells_before ? c : static_cast<std::size_t>(finest.origin[c - cells_before]);
-    const std::size_t from = place(static_cast<std::size_t>(lane_before[origin]));
-    const std::size_t to = place(static_cast<std::size_t>(now.lane[c]));
+    const std::size_t from = before.place(static_cast<std::size_t>(lane_before[origin]));
+    const std::size_t to = before.place(static_cast<std::size_t>(now.lane[c]));
     for (std::size_t k = 0; k < 4; ++k)
       exact_.rotation[to + kGroup * k] = before.rotation[from + kGroup * k];
   }
@@ -210,9 +209,8 @@ template <class S>
 void FastBackend<S>::read_rotations(std::span<double> out) const {
   const PatchedLevel& packed = levels_[0].patched;
   for (std::size_t c = 0; c < packed.lane.size(); ++c) {
-    const auto lane = static_cast<std::size_t>(packed.lane[c]);
-    for (std::size_t k = 0; k < 4; ++k)
-      out[4 * c + k] = exact_.rotation[4 * kGroup * (lane / kGroup) + kGroup * k + lane % kGroup];
+    const std::size_t from = exact_.place(static_cast<std::size_t>(packed.lane[c]));
+    for (std::size_t k = 0; k < 4; ++k) out[4 * c + k] = exact_.rotation[from + kGroup * k];
   }
 }
 
@@ -220,9 +218,8 @@ template <class S>
 void FastBackend<S>::write_rotations(std::span<const double> in) {
   const PatchedLevel& packed = levels_[0].patched;
   for (std::size_t c = 0; c < packed.lane.size(); ++c) {
-    const auto lane = static_cast<std::size_t>(packed.lane[c]);
-    for (std::size_t k = 0; k < 4; ++k)
-      exact_.rotation[4 * kGroup * (lane / kGroup) + kGroup * k + lane % kGroup] = in[4 * c + k];
+    const std::size_t to = exact_.place(static_cast<std::size_t>(packed.lane[c]));
+    for (std::size_t k = 0; k < 4; ++k) exact_.rotation[to + kGroup * k] = in[4 * c + k];
   }
   round_rotations();
 }
@@ -237,9 +234,8 @@ void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool mas
   const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
   sweep<T>(
-      level, kNothingBefore,
-      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
+      level, kNothingBefore, [&](std::size_t tile, int first) { return load_tile(u, tile, first); },
+      u, [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
         store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
         return Sums{};
@@ -272,8 +268,7 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
   const double* u = l.vectors[displacement].exact.data();
   double* to = l.vectors[out].exact.data();
   sweep<double>(
-      0, kNothingBefore,
-      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      0, kNothingBefore, [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
       [&](std::size_t group, const double* x, double* y) {
         elastic_forces(l.patched, exact_, group, x, y);
       },
@@ -287,8 +282,8 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
 // there are some the way from corners has two steps.
 template <class S>
 void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
-                                       const std::int32_t (&child)[Pack<S>::kLanes],
-                                       Pack<S> (&sum)[kEntries]) const {
+                                          const std::int32_t (&child)[Pack<S>::kLanes],
+                                          Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel& packed = from.patched;
   P full[24][24];
@@ -296,9 +291,9 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
   if (finest) {
     const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
     corner_matrices(packed, values_of<S>(), lanes, full);
-    over_slots = lanes.any_fixed;
-    if (lanes.any_fixed && lanes.any_folded) fold_matrices<P>(packed, child, full);
-    if (lanes.any_fixed) mask_matrices(packed, lanes, full);
+    over_slots = lanes.any_held;
+    if (lanes.any_held && lanes.any_folded) fold_matrices<P>(packed, child, full);
+    if (lanes.any_held) mask_matrices(packed, lanes, full);
   } else {
     std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
@@ -319,7 +314,7 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
 
 template <class S>
 void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
-                                Pack<S> (&out)[kEntries]) const {
+                                   Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel& to = levels_[fine + 1].patched;
   const Level& coarse = *to.level;
@@ -379,9 +374,9 @@ void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S
   P keep[3];
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
-  const auto inverse = kernels::inverse_semidefinite(kernels::Sym3<P>{
-      keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
-      keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z});
+  const auto inverse = kernels::inverse_semidefinite(
+      kernels::Sym3<P>{keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+                       keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z});
   S* to = l.inverse_diagonal.data() + 2 * kTileScalars * tile + first;
   const P entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
   for (int e = 0; e < 6; ++e) store_pack(to + kGroup * e, entries[e]);
@@ -450,7 +445,7 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
     const FinestLanes<double> lanes(l.patched, exact_, scale_, cells);
     corner_matrices(l.patched, exact_, lanes, full);
     if (lanes.any_folded) fold_matrices<P>(l.patched, cells, full);
-    if (lanes.any_fixed) mask_matrices(l.patched, lanes, full);
+    if (lanes.any_held) mask_matrices(l.patched, lanes, full);
   } else {
     std::int32_t lanes[Pack<S>::kLanes];
     std::fill(std::begin(lanes), std::end(lanes), -1);
@@ -474,9 +469,9 @@ void FastBackend<S>::factor_coarsest() {
   const int last = static_cast<int>(levels_.size()) - 1;
   factored_ = false;
   for (double share = AssembledLevel::kShare;; share *= kGrowth) {
-    coarsest_->assemble(
-        hierarchy_->levels.back(),
-        [&](std::int32_t cell, std::span<double> out) { read_cell_matrix(last, cell, out); });
+    coarsest_->assemble(hierarchy_->levels.back(), [&](std::int32_t cell, std::span<double> out) {
+      read_cell_matrix(last, cell, out);
+    });
     if (last > 0) coarsest_->strengthen_diagonal(share);
     factored_ = coarsest_factor_.factor(*coarsest_);
     if (factored_) return;

@@ -82,8 +82,7 @@ void FastBackend<S>::chebyshev(int level) {
     sweep<S>(
         level,
         [&](std::size_t tile) {
-          if (put)
-            for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
+          if (put) for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
         },
         value, u,
         [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
@@ -165,9 +164,10 @@ void FastBackend<S>::load_coarse_records(int coarse) {
   for_tiles(0, l.tiles(), [&](std::size_t tile) {
     for_packs<S>([&](int first) {
       S* to = coarse_records_.data() + 4 * (kGroup * tile + static_cast<std::size_t>(first));
-      for_records(load_tile(u, tile, first), [&](int lane, typename Record<S>::Vector record) {
-        __builtin_memcpy(to + 4 * lane, &record, sizeof record);
-      });
+      for_records(load_tile(u, tile, first),
+                  [&](int lane, const typename Record<S>::Vector& record) {
+                    __builtin_memcpy(to + 4 * lane, &record, sizeof record);
+                  });
     });
   });
 }
@@ -177,7 +177,6 @@ template <class S>
 Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t tile,
                                          int first) const {
   using R = typename Record<S>::Vector;
-  static constexpr std::uint16_t kOrder[] = {0, 1, 2, 3, 4, 5, 6, 7};
   const SparseWeights& rows = to.patched.prolong;
   alignas(32) S sums[4 * Pack<S>::kLanes];
   for (int k = 0; k < Pack<S>::kLanes; ++k) {
@@ -190,7 +189,7 @@ Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t til
     }
     __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
   }
-  return masked(gathered(static_cast<const S*>(sums), kOrder), to.fixed(tile, first));
+  return masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first));
 }
 
 /// The correction waits for the sweep that reads the solution next.
@@ -338,7 +337,8 @@ std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int 
   with_types(l.vectors[z], l.vectors[d], [&](const auto* from, const auto*) {
     const auto advance = [&](std::size_t tile, int first) {
       V at = load_tile_as<double>(from, tile, first);
-      if (beta != 0) at += Pack<double>(beta) * load_tile(static_cast<const double*>(to), tile, first);
+      if (beta != 0)
+        at += Pack<double>(beta) * load_tile(static_cast<const double*>(to), tile, first);
       store_tile(to, tile, first, at);
       return at;
     };
@@ -381,9 +381,9 @@ void FastBackend<S>::mask(int level, int x) {
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
       using T = std::decay_t<decltype(*values)>;
       for_packs<T>([&](int first) {
-        store_tile(values, tile, first,
-                   masked(load_tile(static_cast<const T*>(values), tile, first),
-                          l.fixed(tile, first)));
+        store_tile(
+            values, tile, first,
+            masked(load_tile(static_cast<const T*>(values), tile, first), l.fixed(tile, first)));
       });
     });
   });

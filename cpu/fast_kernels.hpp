@@ -38,6 +38,10 @@ struct FinestValues {
   std::vector<S> rotation;  // [group][w x y z][lane]
   std::vector<PackedMaterial<S>> materials;
 
+  /// Where w of a lane lies; the others follow in steps of eight.
+  static std::size_t place(std::size_t lane) {
+    return 4 * kGroup * (lane / kGroup) + lane % kGroup;
+  }
   kernels::Quat<Pack<S>> quaternion(std::size_t group, int first_lane) const {
     const S* q = rotation.data() + 4 * kGroup * group + first_lane;
     return {load_pack(q), load_pack(q + kGroup), load_pack(q + 2 * kGroup),
@@ -208,37 +212,55 @@ struct Weights {
   float w[8][8];
 };
 
+constexpr int kAnyMaterial = -1;
+
+/// Elements of some lanes of level 0 (-1: none) that are of `material`; others have no stiffness.
+template <class S>
+void load_elements(const PatchedLevel& level, const FinestValues<S>& values,
+                   const OperatorScale& scale, const std::int32_t* lanes, int material,
+                   kernels::FinestChild<Pack<S>>& out) {
+  constexpr int kLanes = Pack<S>::kLanes;
+  alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes], mass[kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    q[0][k] = 1;
+    q[1][k] = q[2][k] = q[3][k] = stiffness[k] = mass[k] = 0;
+    if (lanes[k] < 0) continue;
+    const auto lane = static_cast<std::size_t>(lanes[k]);
+    const CellKind& kind = level.kinds[level.kind[lane / kGroup]];
+    if (material != kAnyMaterial && kind.material != material) continue;
+    const S* from = values.rotation.data() + values.place(lane);
+    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
+    stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
+    mass[k] = static_cast<S>(scale.mass * kind.mass);
+  }
+  out.rotation = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+  out.stiffness = load_pack(stiffness);
+  out.mass = load_pack(mass);
+}
+
 /// Some cells of level 0, one in each lane: -1 is none.
 template <class S>
 struct FinestLanes {
   using P = Pack<S>;
-  kernels::Mat3<P> R;
-  P stiffness{}, mass{};  // none in a lane without a cell
-  bool any_folded = false, any_fixed = false;
-  int material = -1;  // of the cells; -2 where they differ
+  kernels::FinestChild<P> element;
+  bool any_folded = false, any_held = false;
+  int material = kAnyMaterial;  // of the cells; kMixed where they differ
   std::int32_t cell[P::kLanes];
+  static constexpr int kMixed = -2;
 
   FinestLanes(const PatchedLevel& level, const FinestValues<S>& values, const OperatorScale& scale,
               const std::int32_t* cells) {
-    kernels::Quat<P> q;
+    std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) {
       cell[k] = cells[k];
+      lanes[k] = cell[k] < 0 ? -1 : level.lane[cell[k]];
       if (cell[k] < 0) continue;
-      const auto lane = static_cast<std::size_t>(level.lane[cell[k]]);
-      const std::size_t group = lane / kGroup, in = lane % kGroup;
-      const S* from = values.rotation.data() + 4 * kGroup * group + in;
-      q.w.set(k, from[0]);
-      q.x.set(k, from[kGroup]);
-      q.y.set(k, from[2 * kGroup]);
-      q.z.set(k, from[3 * kGroup]);
-      const CellKind& kind = level.kinds[level.kind[group]];
-      stiffness.set(k, static_cast<S>(scale.stiffness * kind.stiffness));
-      mass.set(k, static_cast<S>(scale.mass * kind.mass));
+      const int its = level.kinds[level.kind[lanes[k] / kGroup]].material;
       any_folded = any_folded || kernels::has_hanging(level.level->fold[cell[k]]);
-      any_fixed = any_fixed || level.held[cell[k]] != 0;
-      material = material == -1 || material == kind.material ? kind.material : -2;
+      any_held = any_held || level.held[cell[k]] != kFree;
+      material = material == kAnyMaterial || material == its ? its : kMixed;
     }
-    R = kernels::to_matrix(q);
+    load_elements(level, values, scale, lanes, kAnyMaterial, element);
   }
 };
 
@@ -297,12 +319,13 @@ void add_product(const P (&full)[24][24], const kernels::WeightColumns<P>& colum
 
 /// Matrices of some cells of level 0 over their corners, in full.
 template <class S>
-void corner_matrices(const PackedMaterial<S>& m, const FinestLanes<S>& lanes,
+void corner_matrices(const PackedMaterial<S>& m, const kernels::FinestChild<Pack<S>>& element,
                      Pack<S> (&full)[24][24]) {
+  const auto R = kernels::to_matrix(element.rotation);
   for (int i = 0; i < 8; ++i)
     for (int j = 0; j <= i; ++j) {
       const auto block =
-          kernels::rotate_block(m.stiffness, m.mass, lanes.R, lanes.stiffness, lanes.mass, i, j);
+          kernels::rotate_block(m.stiffness, m.mass, R, element.stiffness, element.mass, i, j);
       for (int a = 0; a < 3; ++a)
         for (int b = 0; b < 3; ++b)
           full[3 * i + a][3 * j + b] = full[3 * j + b][3 * i + a] =
@@ -314,13 +337,13 @@ void corner_matrices(const PackedMaterial<S>& m, const FinestLanes<S>& lanes,
 template <class S>
 void corner_matrices(const PatchedLevel& level, const FinestValues<S>& values,
                      const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
-  if (lanes.material != -2) {
+  if (lanes.material != FinestLanes<S>::kMixed) {
     const auto material = static_cast<std::size_t>(std::max(lanes.material, 0));
-    return corner_matrices(values.materials[material], lanes, full);
+    return corner_matrices(values.materials[material], lanes.element, full);
   }
   for (std::size_t m = 0; m < values.materials.size(); ++m) {
     Pack<S> some[24][24];
-    corner_matrices(values.materials[m], lanes, some);
+    corner_matrices(values.materials[m], lanes.element, some);
     for (int k = 0; k < Pack<S>::kLanes; ++k) {
       const bool none = lanes.cell[k] < 0;
       if (!none && level.kinds[level.kind[level.lane[lanes.cell[k]] / kGroup]].material != m)
@@ -341,7 +364,8 @@ void fold_matrices(const PatchedLevel& level, const std::int32_t* cells, P (&ful
 
 /// Zero in the rows and columns of held components. Needs  matrices over slots.
 template <class S>
-void mask_matrices(const PatchedLevel& level, const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
+void mask_matrices(const PatchedLevel& level, const FinestLanes<S>& lanes,
+                   Pack<S> (&full)[24][24]) {
   Pack<S> keep[24];
   for (int i = 0; i < 24; ++i) {
     S of[Pack<S>::kLanes];
@@ -393,23 +417,27 @@ void add_folded_diagonals(const PatchedLevel& level, std::size_t group, int firs
   }
 }
 
-/// Diagonal blocks at the vertices of a group of level 0.
+/// Diagonal blocks at the vertices of a group of level 0. Lanes without a cell have blocks too, at
+/// the point that is nothing.
 template <class S>
 void add_finest_diagonals(const PatchedLevel& level, const FinestValues<S>& values,
                           const OperatorScale& scale, std::size_t group, const BlockPoints<S>& to) {
   using P = Pack<S>;
+  const CellKind& kind = level.kinds[level.kind[group]];
+  const PackedMaterial<S>& m = values.materials[kind.material];
   for_packs<S>([&](int first) {
-    const FinestLanes<S> lanes(level, values, scale, level.cell.data() + kGroup * group + first);
-    const CellKind& kind = level.kinds[level.kind[group]];
-    const PackedMaterial<S>& m = values.materials[kind.material];
-    if (level.folded[group] != 0) {
+    const kernels::FinestChild<P> element{values.quaternion(group, first),
+                                          P(scale.stiffness * kind.stiffness),
+                                          P(scale.mass * kind.mass)};
+    if (level.folded(group)) {
       P full[24][24];
-      corner_matrices(m, lanes, full);
+      corner_matrices(m, element, full);
       add_folded_diagonals(level, group, first, full, to);
       return;
     }
     kernels::Sym3<P> blocks[8];
-    kernels::finest_diagonal_blocks(lanes.R, lanes.stiffness, lanes.mass, m.modes, blocks);
+    kernels::finest_diagonal_blocks(kernels::to_matrix(element.rotation), element.stiffness,
+                                    element.mass, m.modes, blocks);
     for (int i = 0; i < 8; ++i) to.add(corner_points(level, group, first, i), blocks[i]);
   });
 }
@@ -421,7 +449,7 @@ void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& ma
   using P = Pack<S>;
   for_packs<S>([&](int first) {
     matrices.read(group, first, [&](const auto& entries, const P& unit, auto translations) {
-      if (level.folded[group] != 0) {
+      if (level.folded(group)) {
         P all[kEntries] = {}, full[24][24];
         for (int e = 0; e < kernels::kStoredEntries<translations()>; ++e)
           all[e] = unit * entries[e];
@@ -439,8 +467,8 @@ void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& ma
   });
 }
 
-/// w[i][m]: the value at slot i of a cell from those at its corners m, the inverse of its fold: what
-/// lies beyond the cell is extrapolated from its own octant.
+/// w[i][m]: the value at slot i of a cell from those at its corners m, the inverse of its fold:
+/// what lies beyond the cell is extrapolated from its own octant.
 inline void unfold_weights(kernels::FoldCode code, float (&w)[8][8]) {
   const int o = kernels::fold_octant(code);
   for (int i = 0; i < 8; ++i)
@@ -467,30 +495,6 @@ inline Weights child_weights(const Level& level, std::int32_t child, bool slots)
   return out;
 }
 
-/// The octant's children of a group, as elements: all in lanes `first` on that are of `material`.
-template <class S>
-void load_children(const PatchedLevel& level, const FinestValues<S>& values,
-                   const OperatorScale& scale, const std::int32_t* lanes, int material,
-                   kernels::FinestChild<Pack<S>>& out) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes], mass[kLanes];
-  for (int k = 0; k < kLanes; ++k) {
-    q[0][k] = 1;
-    q[1][k] = q[2][k] = q[3][k] = stiffness[k] = mass[k] = 0;
-    if (lanes[k] < 0) continue;
-    const auto lane = static_cast<std::size_t>(lanes[k]);
-    const CellKind& kind = level.kinds[level.kind[lane / kGroup]];
-    if (kind.material != material) continue;
-    const S* from = values.rotation.data() + 4 * kGroup * (lane / kGroup) + lane % kGroup;
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
-    stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
-    mass[k] = static_cast<S>(scale.mass * kind.mass);
-  }
-  out.rotation = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
-  out.stiffness = load_pack(stiffness);
-  out.mass = load_pack(mass);
-}
-
 /// Which materials the children in some lanes of a group are of, as bits.
 template <class S>
 std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* children) {
@@ -502,7 +506,7 @@ std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* childr
   return out;
 }
 
-/// Matrices by modes of parents whose children are of level 0, none of them held.
+/// Matrices by modes of parents whose children are of level 0, none of them partly held.
 template <class S>
 void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
                   const OperatorScale& scale, const std::int32_t* children, bool passed,
@@ -516,7 +520,7 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
     if (((materials >> (m % 64)) & 1) == 0) continue;
     kernels::FinestChild<P> child[8];
     for (int octant = 0; octant < (passed ? 1 : 8); ++octant)
-      load_children(level, values, scale, children + kGroup * octant, static_cast<int>(m),
+      load_elements(level, values, scale, children + kGroup * octant, static_cast<int>(m),
                     child[octant]);
     const kernels::ModeConstants<P>& constants = values.materials[m].modes;
     P some[kEntries];

@@ -171,7 +171,7 @@ class FastBackend final : public Backend {
   T* partial_sums(std::size_t scalars);
   template <class T, class Before, class Own, class Cells, class Finish>
   Sums sweep(int level, const Before& before, const Own& own, const T* u, const Cells& cells,
-               const Finish& finish);
+             const Finish& finish);
   template <class T>
   void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
                     T* y) const;
@@ -180,8 +180,8 @@ class FastBackend final : public Backend {
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
   void add_general_children(const FastLevel<S>& from, bool finest,
-                         const std::int32_t (&child)[Pack<S>::kLanes],
-                         Pack<S> (&sum)[kEntries]) const;
+                            const std::int32_t (&child)[Pack<S>::kLanes],
+                            Pack<S> (&sum)[kEntries]) const;
   void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
   void chebyshev(int level);
   void load_coarse_records(int coarse);
@@ -207,7 +207,7 @@ class FastBackend final : public Backend {
   std::vector<double> partial_;    // sums of shared vertices, by copy; of the scalars of the sweep
   std::vector<S> coarse_records_;  // the solution of a coarse level as points
   int waiting_ = -1;               // level whose solution is still to be corrected
-  std::vector<Vec3d> faces_;           // of the surface: area normals
+  std::vector<Vec3d> faces_;       // of the surface: area normals
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
@@ -231,8 +231,8 @@ T* FastBackend<S>::partial_sums(std::size_t scalars) {
 }
 
 /// One pass over the cells of a level, from the vector u to what finish makes of the sums.
-/// before(tile): shared tiles, first of all, in any order. own, cells, finish: see PatchPoints; cells
-/// gets (group, x, y). finish of a shared tile reads x from u. Returns the sum of what finish
+/// before(tile): shared tiles, first of all, in any order. own, cells, finish: see PatchPoints;
+/// cells gets (group, x, y). finish of a shared tile reads x from u. Returns the sum of what finish
 /// returns, in an order that threads do not change.
 template <class S>
 template <class T, class Before, class Own, class Cells, class Finish>
@@ -284,7 +284,7 @@ void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::si
   }
 }
 
-/// Sums of body(i, eight sums) over scalars i: fixed chunks, summed in their order, eight sums side
+/// Sums of body(i) over scalars i: fixed chunks, summed in their order, eight sums side
 /// by side in each. The same bits for any number of threads.
 template <class S>
 template <std::size_t kSums, class Body>

@@ -49,14 +49,6 @@ template <class S>
 kernels::Vec3<Pack<S>> load_tile(const S* x, std::size_t tile, int first) {
   return {tile_pack(x, tile, 0, first), tile_pack(x, tile, 1, first), tile_pack(x, tile, 2, first)};
 }
-template <class S>
-void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>& v) {
-  S* to = x + kTileScalars * tile + first;
-  store_pack(to, v.x);
-  store_pack(to + kGroup, v.y);
-  store_pack(to + 2 * kGroup, v.z);
-}
-
 /// The same from a vector of any precision.
 template <class S, class From>
 kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) {
@@ -68,6 +60,14 @@ kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) 
     out[c].v = __builtin_convertvector(narrow, typename Pack<S>::Vector);
   }
   return out;
+}
+
+template <class S>
+void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>& v) {
+  S* to = x + kTileScalars * tile + first;
+  store_pack(to, v.x);
+  store_pack(to + kGroup, v.y);
+  store_pack(to + 2 * kGroup, v.z);
 }
 
 /// Lane by lane in the order of the lanes.
@@ -132,9 +132,7 @@ class PatchPoints {
   void load(const Own& own, const S* u) {
     const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
     for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
-      for_packs<S>([&](int first) {
-        put_points(x_, own_points(at, first), own(at, first));
-      });
+      for_packs<S>([&](int first) { put_points(x_, own_points(at, first), own(at, first)); });
     for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k) {
       const S* from = u + scalar_of(level_.copy_vertex[k]);
       S* to = x_ + 4 * std::size_t(level_.copy_point[k]);
@@ -170,10 +168,9 @@ class PatchPoints {
 
  private:
   using R = typename Record<S>::Vector;
-  static R read(const S* x, std::size_t point) {
-    R out;
+  // By reference, since a vector that is returned has another place on machines without AVX.
+  static void read(const S* x, std::size_t point, R& out) {
     __builtin_memcpy(&out, x + 4 * point, sizeof out);
-    return out;
   }
   static void write(S* x, std::size_t point, const R& r) {
     __builtin_memcpy(x + 4 * point, &r, sizeof r);
@@ -185,16 +182,20 @@ class PatchPoints {
 
   void interpolate_hanging() {
     for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
-      const auto& m = level_.hanging_masters[h];
-      write(x_, level_.hanging_point[h],
-            S(0.25) * ((read(x_, m[0]) + read(x_, m[1])) + (read(x_, m[2]) + read(x_, m[3]))));
+      R of[4];
+      for (std::size_t k = 0; k < 4; ++k) read(x_, level_.hanging_masters[h][k], of[k]);
+      write(x_, level_.hanging_point[h], S(0.25) * ((of[0] + of[1]) + (of[2] + of[3])));
     }
   }
   void gather_hanging() {
     for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
-      const R share = S(0.25) * read(y_, level_.hanging_point[h]);
-      for (const std::uint16_t m : level_.hanging_masters[h])
-        write(y_, m, read(y_, m) + share);
+      R share, sum;
+      read(y_, level_.hanging_point[h], share);
+      share *= S(0.25);
+      for (const std::uint16_t m : level_.hanging_masters[h]) {
+        read(y_, m, sum);
+        write(y_, m, sum + share);
+      }
     }
   }
 
@@ -210,7 +211,6 @@ kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::size_t tile, 
                                    const S* partial) {
   using R = typename Record<S>::Vector;
   alignas(32) S sums[4 * Pack<S>::kLanes];
-  static constexpr std::uint16_t kOrder[] = {0, 1, 2, 3, 4, 5, 6, 7};
   for (int k = 0; k < Pack<S>::kLanes; ++k) {
     const std::size_t v = kGroup * tile + static_cast<std::size_t>(first + k) -
                           static_cast<std::size_t>(level.first_shared);
@@ -222,7 +222,7 @@ kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::size_t tile, 
     }
     __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
   }
-  return gathered(static_cast<const S*>(sums), kOrder);
+  return gathered(static_cast<const S*>(sums));
 }
 
 }  // namespace kerf::cpu

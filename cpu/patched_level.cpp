@@ -81,7 +81,8 @@ class Numbering {
       for (std::size_t i = 0; i < 8; ++i) slots.back()[i] = vertex(level_.slots[c][i], draft);
     }
     const std::size_t vertices = draft.vertices.size();
-    for (std::size_t n = 0; n < draft.cells.size(); ++n) corners.push_back(corners_of(draft, n, slots[n]));
+    for (std::size_t n = 0; n < draft.cells.size(); ++n)
+      corners.push_back(corners_of(draft, n, slots[n]));
     for (const std::int32_t v : draft.vertices) first_[v] = -1;
     sort(draft, vertices);
     for (auto* all : {&corners, &slots})
@@ -208,8 +209,7 @@ class Grouping {
       if (run == kGroup)
         for (std::size_t k = 0; k < run; ++k) put(i + k, kind, kRow);
       else
-        for (std::size_t k = 0; k < run; ++k)
-          (k < run / 4 * 4 ? halves : rest).push_back(i + k);
+        for (std::size_t k = 0; k < run; ++k) (k < run / 4 * 4 ? halves : rest).push_back(i + k);
       i += run;
     }
     if (halves.size() % kGroup != 0) {
@@ -434,7 +434,6 @@ void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
     append(out.corners, draft.corners);
     append(out.slots, draft.slots);
     append(out.row, draft.row);
-    append(out.folded, draft.folded);
     append(out.kind, draft.kind);
     append(out.hanging_point, draft.hanging_point);
     append(out.hanging_masters, draft.masters);
@@ -486,18 +485,18 @@ SparseWeights transposed(const SparseWeights& rows, std::size_t columns) {
 }  // namespace
 
 std::size_t PatchedLevel::bytes() const {
-  return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) +
-         bytes_of(corners) + bytes_of(kind) + bytes_of(row) + bytes_of(folded) + bytes_of(slots_at) +
-         bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
-         bytes_of(own_point) + bytes_of(copy_point) + bytes_of(copy_vertex) +
-         bytes_of(hanging_point) + bytes_of(hanging_masters) + bytes_of(copies_begin) + bytes_of(copies_of) +
-         bytes_of(prolong.begin) + bytes_of(prolong.vertex) + bytes_of(prolong.weight) +
-         bytes_of(restrict_.begin) + bytes_of(restrict_.vertex) + bytes_of(restrict_.weight) +
-         bytes_of(held) + bytes_of(children);
+  return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) +
+         bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) + bytes_of(slots) + bytes_of(vertex) +
+         bytes_of(packed) + bytes_of(fixed) + bytes_of(own_point) + bytes_of(copy_point) +
+         bytes_of(copy_vertex) + bytes_of(hanging_point) + bytes_of(hanging_masters) +
+         bytes_of(copies_begin) + bytes_of(copies_of) + bytes_of(prolong.begin) +
+         bytes_of(prolong.vertex) + bytes_of(prolong.weight) + bytes_of(restrict_.begin) +
+         bytes_of(restrict_.vertex) + bytes_of(restrict_.weight) + bytes_of(held) +
+         bytes_of(children);
 }
 
-PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index,
-                          const PatchedLevel* finer, int threads) {
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
+                          int threads) {
   PatchedLevel out;
   out.level = &hierarchy.levels[index];
   const Level& level = *out.level;

@@ -83,8 +83,7 @@ struct PatchedLevel {
   std::vector<std::uint16_t> corners;  // [group][8][8]: points
   std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
   std::vector<std::uint8_t> row;       // per group: RowKind
-  std::vector<std::uint8_t> folded;    // per group: some corner hangs, so that slots differ
-  std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie
+  std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
   std::vector<std::uint16_t> slots;    // [folded group][8][8]: points
 
   std::vector<std::int32_t> vertex;      // per packed vertex: that of the level, -1: none
@@ -95,16 +94,17 @@ struct PatchedLevel {
   std::vector<std::int32_t> copy_vertex;  // packed
   std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> hanging_masters;
-  std::int32_t first_shared = 0;                // packed
-  std::vector<std::int32_t> copies_begin;       // per shared packed vertex + 1
-  std::vector<std::int32_t> copies_of;          // ascending
+  std::int32_t first_shared = 0;           // packed
+  std::vector<std::int32_t> copies_begin;  // per shared packed vertex + 1
+  std::vector<std::int32_t> copies_of;     // ascending
 
-  SparseWeights prolong;                // rows: packed vertices; columns: of the next level
-  SparseWeights restrict_;              // rows: packed vertices of the next level
-  std::vector<std::uint8_t> held;       // per cell: HeldCell, of it or of the cells below
-  std::vector<std::int32_t> children;   // [group][octant][8], above level 0: lanes of the level
-                                        // before, -1: none, or wholly held; passed: octant 0
+  SparseWeights prolong;               // rows: packed vertices; columns: of the next level
+  SparseWeights restrict_;             // rows: packed vertices of the next level
+  std::vector<std::uint8_t> held;      // per cell: HeldCell, of it or of the cells below
+  std::vector<std::int32_t> children;  // [group][octant][8], above level 0: lanes of the level
+                                       // before, -1: none, or wholly held; passed: octant 0
 
+  bool folded(std::size_t group) const { return slots_at[group] >= 0; }
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
   std::size_t tiles() const { return vertex.size() / kGroup; }
@@ -118,8 +118,8 @@ inline std::size_t scalar_of(std::int32_t packed) {
 }
 
 /// All but the weights between levels. `finer` is the level before, null for level 0.
-PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index,
-                          const PatchedLevel* finer, int threads);
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
+                          int threads);
 
 /// The weights from `fine` to the next level.
 void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine);

@@ -5,10 +5,10 @@
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision these
-//         are 16-bit integers, multiples of one number a cell: the greatest entry over 32767. So they
-//         are off by at most 1.5e-5 of it, which a preconditioner does not notice. Held cells are not
-//         coded, nor is the coarsest level: what supports leave of some coarse matrices is singular,
-//         and must not turn indefinite.
+//         are 16-bit integers, multiples of one number a cell: the greatest entry over 32767. So
+//         they are off by at most 1.5e-5 of it, which a preconditioner does not notice. Held cells
+//         are not coded, nor is the coarsest level: what supports leave of some coarse matrices is
+//         singular, and must not turn indefinite.
 #pragma once
 
 #include <algorithm>
@@ -38,9 +38,9 @@ inline Pack<float> widened(const std::int16_t* from) {
 inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
 #if defined(__AVX2__) && defined(__FMA__)
   const __m256i codes = _mm256_cvtps_epi32(__m256(x.v));
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
-                   _mm_packs_epi32(_mm256_castsi256_si128(codes),
-                                   _mm256_extracti128_si256(codes, 1)));
+  _mm_storeu_si128(
+      reinterpret_cast<__m128i*>(to),
+      _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1)));
 #else
   for (int k = 0; k < 8; ++k) to[k] = static_cast<std::int16_t>(std::lrint(x[k]));
 #endif
@@ -82,8 +82,9 @@ class StoredMatrices {
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
   std::size_t bytes() const {
-    return begin_.capacity() * sizeof(begin_[0]) + traits_.capacity() + plain_.capacity() * sizeof(S) +
-           codes_.capacity() * sizeof(codes_[0]) + unit_.capacity() * sizeof(S);
+    return begin_.capacity() * sizeof(begin_[0]) + traits_.capacity() +
+           plain_.capacity() * sizeof(S) + codes_.capacity() * sizeof(codes_[0]) +
+           unit_.capacity() * sizeof(S);
   }
 
   /// Of the lanes from `first` on.
@@ -131,8 +132,7 @@ class StoredMatrices {
           out[e].set(k, unit * static_cast<S>(from[kGroup * static_cast<std::size_t>(e)]));
       } else {
         const S* from = plain_.data() + at;
-        for (int e = 0; e < count; ++e)
-          out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
+        for (int e = 0; e < count; ++e) out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
       }
     }
   }

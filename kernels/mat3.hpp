@@ -279,7 +279,8 @@ KERF_HD Mat3<T> to_matrix_less_identity(const Quat<T>& q) {
   const T xx = x2 * q.x, yy = y2 * q.y, zz = z2 * q.z;
   const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
   const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
-  return {{{-yy - zz, xy - wz, xz + wy}, {xy + wz, -xx - zz, yz - wx}, {xz - wy, yz + wx, -xx - yy}}};
+  return {
+      {{-yy - zz, xy - wz, xz + wy}, {xy + wz, -xx - zz, yz - wx}, {xz - wy, yz + wx, -xx - yy}}};
 }
 
 /// Needs  |q| = 1 up to rounding.

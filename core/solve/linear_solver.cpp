@@ -67,7 +67,7 @@ void LinearSolver::refresh() {
   }
   if (!factors) return;
   backend_.factor_coarsest();
-  ++times_.factors;
+  ++factors_;
   factor_due_ = false;
   decades_with_new_ = 0;
 }
@@ -142,9 +142,9 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
     bool first = true;
     while (stats.cycles < limit && (fixed || norm > goal)) {
       precondition(jacobi);
-      const auto [rho_next, overlap] =
-          first ? std::array{backend_.dot(0, kSolution, residual_), 0.0}
-                : backend_.dots(kSolution, residual_, product_);
+      const auto [rho_next, overlap] = first
+                                           ? std::array{backend_.dot(0, kSolution, residual_), 0.0}
+                                           : backend_.dots(kSolution, residual_, product_);
       if (!(rho_next > 0)) break;  // r is zero, or rounding has won
       const double beta = first ? 0 : -alpha * overlap / rho;
       first = false;

@@ -24,7 +24,6 @@ struct SolveStats {
 struct SolverTimes {
   double structure = 0;  ///< symbolic work: after a cut
   double values = 0;     ///< coarse matrices, diagonal blocks, factors: every update
-  int factors = 0;       ///< how often the coarsest level was factored
   double solve = 0;
 };
 
@@ -37,8 +36,8 @@ class LinearSolver {
   /// After load(): symbolic work, choice of the cycle.
   void set_structure(const Hierarchy& hierarchy);
   /// After set_operator() and rotate_cells(): all values that the method needs. The factor of the
-  /// coarsest level is kept from the last time while cycles contract as they did with a new one: the
-  /// preconditioner is then of slightly older rotations, the solution is not.
+  /// coarsest level is kept from the last time while cycles contract as they did with a new one:
+  /// the preconditioner is then of slightly older rotations, the solution is not.
   void refresh();
   /// Improves x until |b - A x| <= tolerance * reference, or by a fixed number of cycles.
   /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
@@ -46,6 +45,8 @@ class LinearSolver {
 
   CycleType cycle_in_use() const { return cycle_type_; }
   const SolverTimes& times() const { return times_; }
+  /// How often the coarsest level was factored.
+  int factors() const { return factors_; }
   void on_progress(Progress progress) { progress_ = std::move(progress); }
   std::size_t bytes() const;
 
@@ -68,7 +69,8 @@ class LinearSolver {
   int residual_ = -1;                  // the true one, or the recursion of conjugate gradients
   int direction_ = -1, product_ = -1;  // of conjugate gradients
   bool factor_due_ = true;
-  double decades_with_new_ = 0;    // a cycle, of the first solve after it
+  int factors_ = 0;
+  double decades_with_new_ = 0;  // a cycle, of the first solve after it
   SolverTimes times_;
   Progress progress_;
 };

@@ -195,5 +195,75 @@ TEST(FastBackend, RunsWithCutsEndWhereTheReferenceEnds) {
   }
 }
 
+// Cells deep in a support take no part: neither do the coarse cells above them.
+TEST(FastBackend, CoarseMatricesOverThickSupportsAreThoseOfTheReference) {
+  constexpr double kDouble = 1e-12;
+  ProblemOptions options;
+  options.holds = test::Holds::none;
+  options.with_oracle = false;
+  for (const int refinement : {0, 2}) {
+    Hierarchy h =
+        Problem(LinkedOctree(test::box_body({30, 12, 11}), refinement), options).hierarchy;
+    for (std::size_t v = 0; v < h.levels[0].point.size(); ++v)
+      if (h.levels[0].point[v][0] <= 18) h.levels[0].fixed[v] = 7;
+    build_coarse_levels(h, {30, 0, true});
+    ASSERT_GE(h.levels.size(), 3u);
+    const auto exact = test::make_backend("cpu"), fast = test::make_backend("fast");
+    for (Backend* backend : {exact.get(), fast.get()}) {
+      backend->load(h);
+      backend->set_operator({1, 0});
+      for (int l = 0; l + 1 < static_cast<int>(h.levels.size()); ++l) backend->coarsen(l);
+    }
+    for (int l = 1; l < static_cast<int>(h.levels.size()); ++l) {
+      std::vector<double> a(300), b(300);
+      double worst = 0, largest = 0;
+      for (std::int32_t c = 0; c < h.levels[l].cells(); ++c) {
+        exact->read_cell_matrix(l, c, a);
+        fast->read_cell_matrix(l, c, b);
+        for (std::size_t e = 0; e < a.size(); ++e) {
+          worst = std::max(worst, std::abs(a[e] - b[e]));
+          largest = std::max(largest, std::abs(a[e]));
+        }
+      }
+      EXPECT_LE(worst, kDouble * largest) << "level " << l << ", refinement " << refinement;
+    }
+  }
+}
+
+// A factor of slightly older rotations serves; one of another structure or operator does not.
+TEST(LinearSolver, KeepsTheFactorOfTheCoarsestLevelWhileItServes) {
+  constexpr double kTolerance = 1e-9;
+  const Problem p = cut_octree();
+  for (const char* machine : {"cpu", "fast", "mixed"}) {
+    SCOPED_TRACE(machine);
+    const auto backend = test::make_backend(machine);
+    LinearSolver solver(*backend, {});
+    const int b = backend->add_vector(), x = backend->add_vector();
+    const auto solves = [&](double turn) {
+      test::write(*backend, 0, x, turn * p.deformation());
+      backend->rotate_cells(x);
+      solver.refresh();
+      test::write(*backend, 0, b, p.free_vector(0, 101));
+      backend->zero(0, x);
+      const SolveStats stats = solver.solve(b, x, kTolerance);
+      EXPECT_TRUE(stats.converged);
+      EXPECT_LE(stats.residual, kTolerance);
+    };
+    backend->load(p.hierarchy);
+    solver.set_structure(p.hierarchy);
+    backend->set_operator({1, 0});
+    solves(1);
+    EXPECT_EQ(solver.factors(), 1);
+    solves(1.001);
+    EXPECT_EQ(solver.factors(), 1);
+    backend->set_operator(kDynamic);
+    solves(1.001);
+    EXPECT_EQ(solver.factors(), 2);
+    backend->load(p.hierarchy);
+    solves(1.001);
+    EXPECT_EQ(solver.factors(), 3);
+  }
+}
+
 }  // namespace
 }  // namespace kerf

@@ -145,7 +145,8 @@ TEST(Patches, SumSharedVerticesOverAllTheirCopies) {
 
 TEST(Patches, AreTheSameForAnyNumberOfThreads) {
   const Problem p = cut_octree(true);
-  const std::vector<PatchedLevel> one = patches_of(p.hierarchy, 1), more = patches_of(p.hierarchy, 3);
+  const std::vector<PatchedLevel> one = patches_of(p.hierarchy, 1),
+                                  more = patches_of(p.hierarchy, 3);
   for (std::size_t l = 0; l < one.size(); ++l) {
     EXPECT_EQ(one[l].cell, more[l].cell);
     EXPECT_EQ(one[l].corners, more[l].corners);
