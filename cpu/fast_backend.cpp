@@ -28,9 +28,9 @@ FastBackend<S>::FastBackend(int threads, bool updates)
 
 template <class S>
 std::size_t FastBackend<S>::bytes() const {
-  std::size_t sum = bytes_of(partial_) + bytes_of(coarse_records_) + bytes_of(faces_) +
-                    bytes_of(exact_.rotation) + bytes_of(single_.rotation) +
-                    bytes_of(exact_.materials) + bytes_of(single_.materials);
+  std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + bytes_of(exact_.rotation) +
+                    bytes_of(single_.rotation) + bytes_of(exact_.materials) +
+                    bytes_of(single_.materials);
   for (const FastLevel<S>& level : levels_) {
     sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal);
     for (const FastVector& vector : level.vectors)
@@ -72,24 +72,11 @@ PackedMaterial<T> pack_material(double poisson, bool lumped) {
 
 template <class T>
 void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, FinestValues<T>& values) {
-  values.rotation.assign(4 * finest.cell.size(), 0);
-  for (std::size_t g = 0; g < finest.groups(); ++g)
-    std::fill_n(values.rotation.data() + 4 * kGroup * g, kGroup, T(1));
+  values.rotation.clear();
   values.materials.clear();
   for (const double poisson : hierarchy.poisson)
     values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
-}
-
-/// All of a level but its vectors.
-template <class S>
-void FastBackend<S>::load_level(std::size_t l) {
-  FastLevel<S>& level = levels_[l];
-  level.patched =
-      make_patches(*hierarchy_, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
-  if (l > 0) fill_weights(level.patched, levels_[l - 1].patched);
-  level.bound = 0;
-  level.solution_is_zero = false;
-  level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
+  values.no_rotation(0, finest.groups());
 }
 
 template <class S>
@@ -105,8 +92,12 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   waiting_ = -1;
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
-    load_level(l);
     FastLevel<S>& level = levels_[l];
+    level.patched =
+        make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
+    level.bound = 0;
+    level.solution_is_zero = false;
+    level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
     level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
     for (std::size_t x = 0; x < level.vectors.size(); ++x)
       allocate(level.vectors[x], level.patched, x >= kLevelVectors);
@@ -116,50 +107,55 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   load_coarsest();
 }
 
-/// `vector` in other numbers; what is new is zero.
+/// A vector in the numbers of now.
 template <class T>
-void renumber(const std::vector<std::int32_t>& before, const PatchedLevel& now,
+void renumber(const std::vector<PatchMoves::Move>& moves, std::size_t size,
               std::vector<T>& vector) {
   if (vector.empty()) return;
-  std::vector<T> to(kTileScalars * now.tiles(), T(0));
-  for (std::size_t v = 0; v < before.size(); ++v)
+  std::vector<std::array<T, 3>> values(moves.size());
+  for (std::size_t n = 0; n < moves.size(); ++n)
     for (std::size_t c = 0; c < 3; ++c)
-      to[scalar_of(now.packed[v]) + kGroup * c] = vector[scalar_of(before[v]) + kGroup * c];
-  vector = std::move(to);
+      values[n][c] = std::exchange(vector[scalar_of(moves[n].from) + kGroup * c], T(0));
+  vector.resize(size, T(0));
+  for (std::size_t n = 0; n < moves.size(); ++n)
+    for (std::size_t c = 0; c < 3; ++c) vector[scalar_of(moves[n].to) + kGroup * c] = values[n][c];
 }
 
-// Patches are made anew, all of them, since their numbers follow each other; vectors and rotations
-// stay here.
+/// Rotations of the cells that have another lane now, and of new ones.
+template <class T>
+void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestValues<T>& values) {
+  std::vector<std::array<T, 4>> before(moves.cells.size());
+  for (std::size_t n = 0; n < before.size(); ++n)
+    before[n] = values.at(static_cast<std::size_t>(moves.cells[n].from));
+  values.rotation.resize(4 * finest.cell.size());
+  for (const Range& groups : moves.groups)
+    values.no_rotation(static_cast<std::size_t>(groups.first),
+                       static_cast<std::size_t>(groups.end()));
+  for (std::size_t n = 0; n < before.size(); ++n)
+    values.put(static_cast<std::size_t>(finest.lane[moves.cells[n].to]), before[n]);
+}
+
 template <class S>
 void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
   ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
           "a change is not one of the hierarchy that was loaded");
   settle();
-  const std::vector<std::int32_t> lane_before = std::move(levels_[0].patched.lane);
+  PatchMoves moves;
   for (std::size_t l = 0; l < levels_.size(); ++l) {
-    const std::vector<std::int32_t> packed_before = std::move(levels_[l].patched.packed);
-    load_level(l);
-    auto& vectors = levels_[l].vectors;
-    parallel(static_cast<std::int32_t>(vectors.size()), 2, [&](std::int32_t x) {
-      renumber(packed_before, levels_[l].patched, vectors[x].single);
-      renumber(packed_before, levels_[l].patched, vectors[x].exact);
+    FastLevel<S>& level = levels_[l];
+    moves = update_patches(hierarchy, change, l, l == 0 ? nullptr : &levels_[l - 1].patched,
+                           l == 0 ? nullptr : &moves, threads_, level.patched);
+    level.bound = 0;
+    const std::size_t size = kTileScalars * level.patched.tiles();
+    level.inverse_diagonal.resize(2 * size, 0);
+    parallel(static_cast<std::int32_t>(level.vectors.size()), 2, [&](std::int32_t x) {
+      renumber(moves.vertices, size, level.vectors[x].single);
+      renumber(moves.vertices, size, level.vectors[x].exact);
     });
+    if (l > 0) continue;
+    renumber(moves, level.patched, exact_);
+    if constexpr (!std::is_same_v<S, double>) renumber(moves, level.patched, single_);
   }
-  const FinestValues<double> before = std::move(exact_);
-  const PatchedLevel& now = levels_[0].patched;
-  start_values(hierarchy, now, exact_);
-  if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, now, single_);
-  const LevelChange& finest = change.levels[0];
-  for (std::size_t c = 0; c < now.lane.size(); ++c) {
-    const auto cells_before = static_cast<std::size_t>(finest.cells_before);
-    const std::size_t origin =
-        c < cells_before ? c : static_cast<std::size_t>(finest.origin[c - cells_before]);
-    const std::size_t from = before.place(static_cast<std::size_t>(lane_before[origin]));
-    const std::size_t to = before.place(static_cast<std::size_t>(now.lane[c]));
-    for (std::size_t k = 0; k < 4; ++k)
-      exact_.rotation[to + kGroup * k] = before.rotation[from + kGroup * k];
-  }
-  round_rotations();
   load_coarsest();
 }
 
@@ -199,7 +195,7 @@ void FastBackend<S>::rotate_cells(int displacement) {
     const Patch& patch = l.patches[p];
     PatchPoints<double> points(l, patch);
     points.load([&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u);
-    for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g)
+    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
       rotate_group(l, exact_, static_cast<std::size_t>(g), points.x());
   }
   round_rotations();
@@ -224,8 +220,6 @@ void FastBackend<S>::write_rotations(std::span<const double> in) {
   round_rotations();
 }
 
-constexpr auto kNothingBefore = [](std::size_t) {};
-
 template <class S>
 template <class T>
 void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
@@ -234,8 +228,9 @@ void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool mas
   const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
   sweep<T>(
-      level, kNothingBefore, [&](std::size_t tile, int first) { return load_tile(u, tile, first); },
-      u, [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
+      level, kNothingBefore, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
         store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
         return Sums{};
@@ -268,7 +263,8 @@ void FastBackend<S>::elastic_force(int displacement, int out) {
   const double* u = l.vectors[displacement].exact.data();
   double* to = l.vectors[out].exact.data();
   sweep<double>(
-      0, kNothingBefore, [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      0, kNothingBefore, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
       [&](std::size_t group, const double* x, double* y) {
         elastic_forces(l.patched, exact_, group, x, y);
       },
@@ -351,6 +347,7 @@ void FastBackend<S>::coarsen(int fine) {
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     const std::uint16_t kind = packed.kind[group];
+    if (kind == kNoCells) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
@@ -384,7 +381,7 @@ void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S
 
 template <class S>
 void invert_own(FastLevel<S>& l, const Patch& patch, const BlockPoints<S>& from) {
-  for (std::int32_t v = patch.first_own; v < patch.first_own + patch.own; v += kGroup)
+  for (std::int32_t v = patch.own.first; v < patch.own.end(); v += kGroup)
     for_packs<S>([&](int first) {
       const std::uint16_t* points = l.patched.own_point.data() + v + first;
       invert_tile(l, static_cast<std::size_t>(v / kGroup), first,
@@ -410,7 +407,7 @@ void FastBackend<S>::prepare(int level) {
     S* const blocks = buffer.reserve(2 * scalars);
     std::fill_n(blocks, 2 * scalars, S(0));
     const BlockPoints<S> to{blocks, blocks + scalars};
-    for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g) {
+    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
       if (level == 0)
         add_finest_diagonals(packed, values_of<S>(), scale_, group, to);
@@ -418,15 +415,15 @@ void FastBackend<S>::prepare(int level) {
         add_stored_diagonals(packed, l.matrices, group, to);
     }
     invert_own(l, patch, to);
-    for (std::int32_t k = patch.first_copy; k < patch.first_copy + patch.copies; ++k) {
+    for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
       std::copy_n(to.upper + 4 * std::size_t(packed.copy_point[k]), 4, upper + 4 * std::size_t(k));
       std::copy_n(to.lower + 4 * std::size_t(packed.copy_point[k]), 4, lower + 4 * std::size_t(k));
     }
   }
-  for_tiles(packed.first_shared / kGroup, l.tiles(), [&](std::size_t tile) {
+  parallel(static_cast<std::int32_t>(packed.shared_tiles.size()), kWorthTiles, [&](std::int32_t n) {
     for_packs<S>([&](int first) {
-      invert_tile(l, tile, first, shared_sums(packed, tile, first, upper),
-                  shared_sums(packed, tile, first, lower));
+      invert_tile(l, static_cast<std::size_t>(packed.shared_tiles[n]), first,
+                  shared_sums(packed, n, first, upper), shared_sums(packed, n, first, lower));
     });
   });
   if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size()))

@@ -23,7 +23,7 @@ double FastBackend<S>::residual(int level) {
     return std::sqrt(dot(level, kResidual, kResidual));
   }
   const Sums sums = sweep<S>(
-      level, [](std::size_t) {},
+      level, kNothingBefore, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
       [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
@@ -73,7 +73,14 @@ void FastBackend<S>::chebyshev(int level) {
     return Pack<S>(first_take) * l.times_inverse(tile, first, load_tile(f, tile, first));
   };
   const auto corrected = [&](std::size_t tile, int first) {
-    return load_tile(static_cast<const S*>(u), tile, first) + correction(l, tile, first);
+    return load_tile(static_cast<const S*>(u), tile, first) +
+           masked(transfer_here<S>()->taken(tile, first), l.fixed(tile, first));
+  };
+  const auto start = [&](std::size_t patch) {
+    auto& points = transfer_here<S>();
+    if (waiting_ != level) return points.reset();
+    points.emplace(l.patched, patch);
+    points->load(levels_[level + 1].patched, levels_[level + 1].at(kSolution));
   };
   const auto as_it_is = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first);
@@ -84,7 +91,7 @@ void FastBackend<S>::chebyshev(int level) {
         [&](std::size_t tile) {
           if (put) for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
         },
-        value, u,
+        start, value, u,
         [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
         [&](std::size_t tile, int first, const V& sum, const auto& before) {
           const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
@@ -111,10 +118,12 @@ void FastBackend<S>::chebyshev(int level) {
     step(from_zero, true, static_cast<S>(keep), static_cast<S>(take), true, degree == 2);
     done = 2;
   } else {
-    if (waiting_ == level)
-      step(corrected, true, S(0), first_take, false, degree == 1);
-    else
+    if (waiting_ == level) {
+      correct_shared(level);
+      step(corrected, false, S(0), first_take, false, degree == 1);
+    } else {
       step(as_it_is, false, S(0), first_take, false, degree == 1);
+    }
     done = 1;
   }
   waiting_ = -1;
@@ -130,73 +139,52 @@ void FastBackend<S>::restrict_residual(int fine) {
   settle();
   FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
-  const SparseWeights& rows = from.patched.restrict_;
+  const Transfer& transfer = from.patched.transfer;
   const S* r = from.at(kResidual);
   S* f = to.at(kRight);
-  for_tiles(0, to.tiles(), [&](std::size_t tile) {
-    alignas(32) S sums[kTileScalars];
-    for (std::size_t k = 0; k < kGroup; ++k) {
-      const std::size_t v = kGroup * tile + k;
-      S x = 0, y = 0, z = 0;
-      for (std::int32_t i = rows.begin[v]; i < rows.begin[v + 1]; ++i) {
-        const S* at = r + scalar_of(rows.vertex[i]);
-        const S w = static_cast<S>(rows.weight[i]);
-        x = std::fma(w, at[0], x);
-        y = std::fma(w, at[kGroup], y);
-        z = std::fma(w, at[2 * kGroup], z);
-      }
-      sums[k] = x, sums[kGroup + k] = y, sums[2 * kGroup + k] = z;
+  S* const given = partial_sums<S>(4 * transfer.point.size());
+  const auto patches = static_cast<std::int32_t>(from.patched.patches.size());
+#pragma omp parallel num_threads(threads_) if (from.patched.cell.size() >= kWorthCells)
+  {
+#pragma omp for schedule(dynamic, 1)
+    for (std::int32_t p = 0; p < patches; ++p)
+      TransferPoints<S>(from.patched, static_cast<std::size_t>(p)).give(r, given);
+#pragma omp for schedule(static)
+    for (std::int32_t t = 0; t < to.tiles(); ++t) {
+      const auto tile = static_cast<std::size_t>(t);
+      for_packs<S>([&](int first) {
+        alignas(32) S sums[4 * Pack<S>::kLanes] = {};
+        for (int k = 0; k < Pack<S>::kLanes; ++k)
+          if (const std::int32_t v = to.patched.vertex[kGroup * tile + std::size_t(first + k)];
+              v >= 0)
+            sum_records<S>(transfer.givers_of(v), given, sums + 4 * k);
+        store_tile(f, tile, first,
+                   masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first)));
+      });
     }
-    for_packs<S>([&](int first) {
-      store_tile(f, tile, first,
-                 masked(load_tile(static_cast<const S*>(sums), 0, first), to.fixed(tile, first)));
-    });
-  });
+  }
   zero(fine + 1, kSolution);
 }
 
-/// The solution of a coarse level as points, which finer vertices gather.
+/// Corrects the vertices of a level that patches share.
 template <class S>
-void FastBackend<S>::load_coarse_records(int coarse) {
-  FastLevel<S>& l = levels_[coarse];
-  coarse_records_.resize(std::max(coarse_records_.size(), 4 * l.patched.vertices()));
-  const S* u = l.at(kSolution);
-  for_tiles(0, l.tiles(), [&](std::size_t tile) {
-    for_packs<S>([&](int first) {
-      S* to = coarse_records_.data() + 4 * (kGroup * tile + static_cast<std::size_t>(first));
-      for_records(load_tile(u, tile, first),
-                  [&](int lane, const typename Record<S>::Vector& record) {
-                    __builtin_memcpy(to + 4 * lane, &record, sizeof record);
-                  });
-    });
-  });
-}
-
-/// What the next level corrects in the vertices of a tile.
-template <class S>
-Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t tile,
-                                         int first) const {
-  using R = typename Record<S>::Vector;
-  const SparseWeights& rows = to.patched.prolong;
-  alignas(32) S sums[4 * Pack<S>::kLanes];
-  for (int k = 0; k < Pack<S>::kLanes; ++k) {
-    const std::size_t v = kGroup * tile + static_cast<std::size_t>(first + k);
-    R sum{};
-    for (std::int32_t i = rows.begin[v]; i < rows.begin[v + 1]; ++i) {
-      R one;
-      __builtin_memcpy(&one, coarse_records_.data() + 4 * std::size_t(rows.vertex[i]), sizeof one);
-      sum += static_cast<S>(rows.weight[i]) * one;
-    }
-    __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
+void FastBackend<S>::correct_shared(int level) {
+  FastLevel<S>& l = levels_[level];
+  FastLevel<S>& next = levels_[level + 1];
+  const auto patches = static_cast<std::int32_t>(l.patched.patches.size());
+#pragma omp parallel for num_threads(threads_) \
+    schedule(dynamic, 1) if (l.patched.cell.size() >= kWorthCells)
+  for (std::int32_t p = 0; p < patches; ++p) {
+    TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
+    points.load(next.patched, next.at(kSolution));
+    points.add_to_leads(l.at(kSolution));
   }
-  return masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first));
 }
 
 /// The correction waits for the sweep that reads the solution next.
 template <class S>
 void FastBackend<S>::prolong_correction(int fine) {
   settle();
-  load_coarse_records(fine + 1);
   changed(fine, kSolution);
   waiting_ = fine;
 }
@@ -205,13 +193,22 @@ template <class S>
 void FastBackend<S>::settle() {
   if (waiting_ < 0) return;
   FastLevel<S>& l = levels_[waiting_];
+  FastLevel<S>& next = levels_[waiting_ + 1];
+  correct_shared(waiting_);
   waiting_ = -1;
   S* u = l.at(kSolution);
-  for_tiles(0, l.tiles(), [&](std::size_t tile) {
-    for_packs<S>([&](int first) {
-      store_tile(u, tile, first,
-                 load_tile(static_cast<const S*>(u), tile, first) + correction(l, tile, first));
-    });
+  parallel(static_cast<std::int32_t>(l.patched.patches.size()), 2, [&](std::int32_t p) {
+    TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
+    points.load(next.patched, next.at(kSolution));
+    const Range& own = l.patched.patches[p].own;
+    for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
+      const auto tile = static_cast<std::size_t>(t);
+      for_packs<S>([&](int first) {
+        store_tile(u, tile, first,
+                   load_tile(static_cast<const S*>(u), tile, first) +
+                       masked(points.taken(tile, first), l.fixed(tile, first)));
+      });
+    }
   });
 }
 
@@ -344,7 +341,7 @@ std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int 
     };
     sums = sweep<double>(
         0, [&](std::size_t tile) { for_packs<double>([&](int first) { advance(tile, first); }); },
-        advance, to,
+        kNothingBefore, advance, to,
         [&](std::size_t group, const double* x, double* y) {
           add_products(0, scale_, group, x, y);
         },

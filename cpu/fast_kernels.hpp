@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <type_traits>
 #include <vector>
 
@@ -41,6 +42,20 @@ struct FinestValues {
   /// Where w of a lane lies; the others follow in steps of eight.
   static std::size_t place(std::size_t lane) {
     return 4 * kGroup * (lane / kGroup) + lane % kGroup;
+  }
+  std::array<S, 4> at(std::size_t lane) const {
+    const S* q = rotation.data() + place(lane);
+    return {q[0], q[kGroup], q[2 * kGroup], q[3 * kGroup]};
+  }
+  void put(std::size_t lane, const std::array<S, 4>& q) {
+    for (std::size_t k = 0; k < 4; ++k) rotation[place(lane) + kGroup * k] = q[k];
+  }
+  /// The identity in some groups.
+  void no_rotation(std::size_t begin, std::size_t end) {
+    rotation.resize(std::max(rotation.size(), 4 * kGroup * end));
+    std::fill(rotation.begin() + 4 * kGroup * begin, rotation.begin() + 4 * kGroup * end, S(0));
+    for (std::size_t g = begin; g < end; ++g)
+      std::fill_n(rotation.begin() + 4 * kGroup * g, kGroup, S(1));
   }
   kernels::Quat<Pack<S>> quaternion(std::size_t group, int first_lane) const {
     const S* q = rotation.data() + 4 * kGroup * group + first_lane;

@@ -17,6 +17,7 @@
 #include "core/solve/sparse_cholesky.hpp"
 #include "cpu/fast_kernels.hpp"
 #include "cpu/patch_sweep.hpp"
+#include "cpu/transfer_points.hpp"
 
 namespace kerf::cpu {
 
@@ -53,6 +54,8 @@ void with_types(From& from, To& to, const Body& body) {
   else
     body(from.single.data(), to.single.data());
 }
+
+constexpr auto kNothingBefore = [](std::size_t) {};
 
 template <class S>
 struct FastLevel {
@@ -161,7 +164,6 @@ class FastBackend final : public Backend {
   static constexpr std::size_t kWorthCells = 4096;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 
-  void load_level(std::size_t l);
   void load_coarsest();
   void allocate(FastVector& vector, const PatchedLevel& level, bool exact) const;
   void round_rotations();
@@ -169,9 +171,9 @@ class FastBackend final : public Backend {
   const FinestValues<T>& values_of() const;
   template <class T>
   T* partial_sums(std::size_t scalars);
-  template <class T, class Before, class Own, class Cells, class Finish>
-  Sums sweep(int level, const Before& before, const Own& own, const T* u, const Cells& cells,
-             const Finish& finish);
+  template <class T, class Before, class Start, class Own, class Cells, class Finish>
+  Sums sweep(int level, const Before& before, const Start& start, const Own& own, const T* u,
+             const Cells& cells, const Finish& finish);
   template <class T>
   void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
                     T* y) const;
@@ -184,8 +186,7 @@ class FastBackend final : public Backend {
                             Pack<S> (&sum)[kEntries]) const;
   void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
   void chebyshev(int level);
-  void load_coarse_records(int coarse);
-  Vec3<Pack<S>> correction(const FastLevel<S>& to, std::size_t tile, int first) const;
+  void correct_shared(int level);
   void settle();
   void expects_exact(int in, int out) const {
     ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
@@ -204,10 +205,9 @@ class FastBackend final : public Backend {
   FinestValues<S> single_;      // the same, rounded; empty if S is double
   std::vector<FastLevel<S>> levels_;
   int vectors_on_finest_ = kLevelVectors;
-  std::vector<double> partial_;    // sums of shared vertices, by copy; of the scalars of the sweep
-  std::vector<S> coarse_records_;  // the solution of a coarse level as points
-  int waiting_ = -1;               // level whose solution is still to be corrected
-  std::vector<Vec3d> faces_;       // of the surface: area normals
+  std::vector<double> partial_;  // sums of shared vertices, by copy; of the scalars of the sweep
+  int waiting_ = -1;             // level whose solution is still to be corrected
+  std::vector<Vec3d> faces_;     // of the surface: area normals
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   SparseCholesky coarsest_factor_;
@@ -231,40 +231,42 @@ T* FastBackend<S>::partial_sums(std::size_t scalars) {
 }
 
 /// One pass over the cells of a level, from the vector u to what finish makes of the sums.
-/// before(tile): shared tiles, first of all, in any order. own, cells, finish: see PatchPoints;
-/// cells gets (group, x, y). finish of a shared tile reads x from u. Returns the sum of what finish
+/// before(tile): shared tiles, first of all, in any order. start(patch): before what is asked of a
+/// patch, on the same thread. own, cells, finish: see PatchPoints; cells gets (group, x, y). finish
+/// of a shared tile reads x from u. Returns the sum of what finish
 /// returns, in an order that threads do not change.
 template <class S>
-template <class T, class Before, class Own, class Cells, class Finish>
-Sums FastBackend<S>::sweep(int level, const Before& before, const Own& own, const T* u,
-                           const Cells& cells, const Finish& finish) {
+template <class T, class Before, class Start, class Own, class Cells, class Finish>
+Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, const Own& own,
+                           const T* u, const Cells& cells, const Finish& finish) {
   const PatchedLevel& l = levels_[level].patched;
   const auto patches = static_cast<std::int32_t>(l.patches.size());
-  const std::int32_t first_shared = l.first_shared / kGroup, tiles = levels_[level].tiles();
+  const auto shared = static_cast<std::int32_t>(l.shared_tiles.size());
   T* const partial = partial_sums<T>(4 * l.copy_point.size());
-  std::vector<Sums> sums(l.patches.size() + static_cast<std::size_t>(tiles - first_shared));
+  std::vector<Sums> sums(l.patches.size() + l.shared_tiles.size());
 #pragma omp parallel num_threads(threads_) if (l.cell.size() >= kWorthCells)
   {
 #pragma omp for schedule(static)
-    for (std::int32_t t = first_shared; t < tiles; ++t) before(static_cast<std::size_t>(t));
+    for (std::int32_t n = 0; n < shared; ++n) before(static_cast<std::size_t>(l.shared_tiles[n]));
 #pragma omp for schedule(dynamic, 1)
     for (std::int32_t p = 0; p < patches; ++p) {
       const Patch& patch = l.patches[p];
       PatchPoints<T> points(l, patch);
+      start(static_cast<std::size_t>(p));
       points.load(own, u);
-      for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g)
+      for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
         cells(static_cast<std::size_t>(g), points.x(), points.y());
       sums[p] = points.store(finish, partial);
     }
 #pragma omp for schedule(static)
-    for (std::int32_t t = first_shared; t < tiles; ++t) {
-      const auto tile = static_cast<std::size_t>(t);
+    for (std::int32_t n = 0; n < shared; ++n) {
+      const auto tile = static_cast<std::size_t>(l.shared_tiles[n]);
       Sums sum;
       for_packs<T>([&](int first) {
-        sum += finish(tile, first, shared_sums(l, tile, first, partial),
+        sum += finish(tile, first, shared_sums(l, n, first, partial),
                       [&] { return load_tile(u, tile, first); });
       });
-      sums[l.patches.size() + static_cast<std::size_t>(t - first_shared)] = sum;
+      sums[l.patches.size() + static_cast<std::size_t>(n)] = sum;
     }
   }
   Sums sum;

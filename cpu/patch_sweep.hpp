@@ -111,6 +111,17 @@ void for_packs(const Body& body) {
   for (int first = 0; first < kGroup; first += Pack<S>::kLanes) body(first);
 }
 
+/// The sum of some of many records, in their order.
+template <class S>
+void sum_records(std::span<const std::int32_t> which, const S* records, S* out) {
+  typename Record<S>::Vector sum{}, one;
+  for (const std::int32_t n : which) {
+    __builtin_memcpy(&one, records + 4 * std::size_t(n), sizeof one);
+    sum += one;
+  }
+  __builtin_memcpy(out, &sum, sizeof sum);
+}
+
 /// The points of one patch: x, which the cells read, and y, to which they add.
 template <class S>
 class PatchPoints {
@@ -130,10 +141,9 @@ class PatchPoints {
   /// own(tile, first lane): the vectors of vertices of this patch alone; shared vertices from u.
   template <class Own>
   void load(const Own& own, const S* u) {
-    const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
-    for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
+    for (std::size_t at = first_tile(); at < end_tile(); ++at)
       for_packs<S>([&](int first) { put_points(x_, own_points(at, first), own(at, first)); });
-    for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k) {
+    for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k) {
       const S* from = u + scalar_of(level_.copy_vertex[k]);
       S* to = x_ + 4 * std::size_t(level_.copy_point[k]);
       to[0] = from[0];
@@ -153,14 +163,13 @@ class PatchPoints {
   Sums store(const Finish& finish, S* partial) {
     gather_hanging();
     Sums sum;
-    const auto tiles = static_cast<std::size_t>(patch_.own / kGroup);
-    for (std::size_t t = 0, at = first_tile(); t < tiles; ++t, ++at)
+    for (std::size_t at = first_tile(); at < end_tile(); ++at)
       for_packs<S>([&](int first) {
         const std::uint16_t* points = own_points(at, first);
         sum += finish(at, first, gathered(y_, points),
                       [&] { return gathered(static_cast<const S*>(x_), points); });
       });
-    for (std::int32_t k = patch_.first_copy; k < patch_.first_copy + patch_.copies; ++k)
+    for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k)
       std::memcpy(partial + 4 * std::size_t(k), y_ + 4 * std::size_t(level_.copy_point[k]),
                   4 * sizeof(S));
     return sum;
@@ -175,20 +184,21 @@ class PatchPoints {
   static void write(S* x, std::size_t point, const R& r) {
     __builtin_memcpy(x + 4 * point, &r, sizeof r);
   }
-  std::size_t first_tile() const { return static_cast<std::size_t>(patch_.first_own / kGroup); }
+  std::size_t first_tile() const { return static_cast<std::size_t>(patch_.own.first / kGroup); }
+  std::size_t end_tile() const { return static_cast<std::size_t>(patch_.own.end() / kGroup); }
   const std::uint16_t* own_points(std::size_t tile, int first) const {
     return level_.own_point.data() + kGroup * tile + first;
   }
 
   void interpolate_hanging() {
-    for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
+    for (std::int32_t h = patch_.hanging.first; h < patch_.hanging.end(); ++h) {
       R of[4];
       for (std::size_t k = 0; k < 4; ++k) read(x_, level_.hanging_masters[h][k], of[k]);
       write(x_, level_.hanging_point[h], S(0.25) * ((of[0] + of[1]) + (of[2] + of[3])));
     }
   }
   void gather_hanging() {
-    for (std::int32_t h = patch_.first_hanging; h < patch_.first_hanging + patch_.hanging; ++h) {
+    for (std::int32_t h = patch_.hanging.first; h < patch_.hanging.end(); ++h) {
       R share, sum;
       read(y_, level_.hanging_point[h], share);
       share *= S(0.25);
@@ -205,23 +215,14 @@ class PatchPoints {
   S* y_;
 };
 
-/// The sums of a tile of shared vertices, or of half of it, over their copies.
+/// The sums of the n-th tile of shared vertices, or of half of it, over their copies.
 template <class S>
-kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::size_t tile, int first,
+kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::int32_t n, int first,
                                    const S* partial) {
-  using R = typename Record<S>::Vector;
-  alignas(32) S sums[4 * Pack<S>::kLanes];
-  for (int k = 0; k < Pack<S>::kLanes; ++k) {
-    const std::size_t v = kGroup * tile + static_cast<std::size_t>(first + k) -
-                          static_cast<std::size_t>(level.first_shared);
-    R sum{};
-    for (std::int32_t i = level.copies_begin[v]; i < level.copies_begin[v + 1]; ++i) {
-      R one;
-      __builtin_memcpy(&one, partial + 4 * std::size_t(level.copies_of[i]), sizeof one);
-      sum += one;
-    }
-    __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
-  }
+  alignas(32) S sums[4 * Pack<S>::kLanes] = {};
+  const std::int32_t begin = kGroup * n + first;
+  for (int k = 0; k < Pack<S>::kLanes && begin + k < level.shared; ++k)
+    sum_records(level.copies(begin + k), partial, sums + 4 * k);
   return gathered(static_cast<const S*>(sums));
 }
 

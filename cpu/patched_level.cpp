@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <numeric>
-#include <tuple>
-#include <unordered_map>
 #include <utility>
 
 #include "core/base/error.hpp"
-#include "kernels/transfer.hpp"
+#include "cpu/patch_draft.hpp"
+#include "cpu/patch_transfer.hpp"
 
 namespace kerf::cpu {
 namespace {
@@ -20,529 +19,541 @@ std::size_t bytes_of(const std::vector<T>& array) {
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
-/// Bits of x with two zeros after each.
-std::uint64_t spread(std::uint64_t x) {
-  x &= 0x1FFFFF;
-  x = (x | x << 32) & 0x1F00000000FFFF;
-  x = (x | x << 16) & 0x1F0000FF0000FF;
-  x = (x | x << 8) & 0x100F00F00F00F00F;
-  x = (x | x << 4) & 0x10C30C30C30C30C3;
-  x = (x | x << 2) & 0x1249249249249249;
-  return x;
-}
-
-std::uint64_t morton(const Vec3i& c) {
-  const auto at = [&](std::size_t d) { return spread(static_cast<std::uint64_t>(c[d])); };
-  return at(0) | at(1) << 1 | at(2) << 2;
-}
+constexpr std::int32_t kMostCells = 4096;  // of a patch, when it is made
 
 /// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kMost = 4096, kLeast = 256, kPatches = 16;
-  std::int32_t size = kMost;
+  constexpr std::int32_t kLeast = 256, kPatches = 16;
+  std::int32_t size = kMostCells;
   while (size > kLeast && cells < kPatches * size) size /= 2;
   return size;
 }
 
-using Corners = std::array<std::uint16_t, 8>;
-constexpr std::uint16_t kNothing = 0xFFFF;
-
-/// A patch before its numbers are known to the level.
-struct Draft {
-  std::vector<std::int32_t> cells;          // per lane, -1: none
-  std::vector<std::uint16_t> corners;       // [group][8][8]
-  std::vector<std::uint16_t> slots;         // the same, of the groups that are folded
-  std::vector<std::uint8_t> folded;         // per group
-  std::vector<std::uint8_t> row;            // per group
-  std::vector<std::uint16_t> kind;          // per group
-  std::vector<std::int32_t> vertices;       // of the level, ascending by their points
-  std::vector<std::uint16_t> vertex_point;  // rising
-  std::vector<std::uint16_t> hanging_point;
-  std::vector<std::array<std::uint16_t, 4>> masters;
-};
-
-/// Orders points by z, then y, then x, so that rows of cells have rows of points.
-std::uint64_t place_key(const Vec3i& p) {
-  const auto at = [&](std::size_t d) { return static_cast<std::uint64_t>(p[d]) & 0x1FFFFF; };
-  return at(2) << 42 | at(1) << 21 | at(0);
+/// Cells along a curve that stays within cubes, in equal parts.
+std::vector<std::vector<std::int32_t>> divide(const Level& level,
+                                              const std::vector<std::int32_t>& cells,
+                                              std::int32_t size) {
+  std::vector<std::pair<std::uint64_t, std::int32_t>> order;
+  order.reserve(cells.size());
+  for (const std::int32_t c : cells) order.emplace_back(morton(level.corner[c]), c);
+  std::sort(order.begin(), order.end());
+  const auto most = static_cast<std::size_t>(size);
+  std::vector<std::vector<std::int32_t>> parts((order.size() + most - 1) / most);
+  for (std::size_t i = 0; i < order.size(); ++i) parts[i / most].push_back(order[i].second);
+  return parts;
 }
 
-/// The points of one patch after the other.
-class Numbering {
- public:
-  explicit Numbering(const Level& level) : level_(level), first_(level.point.size(), -1) {}
+/// A packed vertex of a draft that has no place yet.
+std::int32_t claim(std::int32_t patch) { return -2 - patch; }
 
-  /// Corners and slots of the draft's cells, as points.
-  void number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots) {
-    places_.clear();
-    hanging_.clear();
-    for (const std::int32_t c : draft.cells) {
-      slots.emplace_back();
-      for (std::size_t i = 0; i < 8; ++i) slots.back()[i] = vertex(level_.slots[c][i], draft);
+template <class T>
+void put(const std::vector<T>& from, std::int32_t first, std::vector<T>& to) {
+  std::copy(from.begin(), from.end(), to.begin() + first);
+}
+
+/// Makes patches, or makes some of them again.
+class Patcher {
+ public:
+  Patcher(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer, int threads,
+          PatchedLevel& out)
+      : hierarchy_(hierarchy),
+        level_(hierarchy.levels[index]),
+        next_(index + 1 < hierarchy.levels.size() ? &hierarchy.levels[index + 1] : nullptr),
+        finer_(finer),
+        threads_(threads),
+        out_(out) {
+    out_.level = &level_;
+  }
+
+  void make() {
+    std::vector<std::int32_t> all(level_.corner.size());
+    std::iota(all.begin(), all.end(), 0);
+    extend();
+    for (const std::int32_t c : all) out_.held[c] = held_of(c);
+    for (auto& cells : divide(level_, all, patch_cells(level_.cells()))) add_patch(cells);
+    make_drafts(0);
+    anew_ = true;
+    place();
+  }
+
+  PatchMoves update(const HierarchyChange& change, std::size_t index, const PatchMoves* below) {
+    change_ = &change.levels[index];
+    extend();
+    mark(*change_, index + 1 < change.levels.size() ? &change.levels[index + 1] : nullptr, below);
+    for (std::int32_t p = 0, count = size_of(dirty_.size()); p < count; ++p)
+      if (dirty_[p]) draft_patch(p);
+    make_drafts(0);
+    // A vertex of another patch alone is now shared with it, so that one changes too.
+    for (std::size_t done = 0; done < drafts_.size();) {
+      const std::size_t end = drafts_.size();
+      for (; done < end; ++done)
+        for (const std::int32_t v : drafts_[done].vertices)
+          if (const std::int32_t home = home_of(v); home >= 0 && !dirty_[home]) draft_patch(home);
+      make_drafts(end);
     }
-    const std::size_t vertices = draft.vertices.size();
-    for (std::size_t n = 0; n < draft.cells.size(); ++n)
-      corners.push_back(corners_of(draft, n, slots[n]));
-    for (const std::int32_t v : draft.vertices) first_[v] = -1;
-    sort(draft, vertices);
-    for (auto* all : {&corners, &slots})
-      for (Corners& of : *all)
-        for (std::uint16_t& point : of) point = rank_[point];
+    std::sort(drafts_.begin(), drafts_.end(),
+              [](const Draft& a, const Draft& b) { return a.patch < b.patch; });
+    place();
+    if (below != nullptr) place_moved_children(*below);
+    return std::move(moves_);
   }
 
  private:
-  std::uint16_t vertex(std::int32_t v, Draft& draft) {
-    if (first_[v] < 0) {
-      first_[v] = size_of(draft.vertices.size());
-      draft.vertices.push_back(v);
-      places_.push_back(place_key(level_.point[v]));
-    }
-    return static_cast<std::uint16_t>(first_[v]);
+  // --- what cells are -------------------------------------------------------------------------
+
+  void extend() {
+    out_.lane.resize(level_.corner.size(), -1);
+    out_.held.resize(level_.corner.size(), kFree);
+    out_.packed.resize(level_.point.size(), -1);
   }
 
-  Corners corners_of(Draft& draft, std::size_t n, const Corners& slots) {
-    const std::int32_t cell = draft.cells[n];
-    const kernels::FoldCode fold = level_.fold[cell];
-    Corners out = slots;
-    if (!kernels::has_hanging(fold)) return out;
-    for (int i = 0; i < 8; ++i) {
-      if (!kernels::is_hanging(fold, i)) continue;
-      const auto masters = masters_of(slots, kernels::fold_octant(fold), i);
-      const std::uint64_t key = std::uint64_t{masters[0]} | std::uint64_t{masters[1]} << 16 |
-                                std::uint64_t{masters[2]} << 32 | std::uint64_t{masters[3]} << 48;
-      const auto [entry, added] = hanging_.try_emplace(key, size_of(places_.size()));
-      if (added) {
-        Vec3i p = level_.corner[cell];
-        for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) << level_.size_log2[cell];
-        places_.push_back(place_key(p));
-        draft.masters.push_back(masters);
-      }
-      out[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(entry->second);
-    }
-    return out;
-  }
-
-  /// The points that a hanging corner is the mean of.
-  static std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int corner) {
-    std::array<std::uint16_t, 4> out{};
-    std::size_t n = 0;
-    for (int j = 0; j < 8; ++j)
-      if (kernels::is_between(octant, corner, j)) out[n++] = slots[static_cast<std::size_t>(j)];
-    if (n == 2) out[2] = out[0], out[3] = out[1];
-    std::sort(out.begin(), out.end());
-    return out;
-  }
-
-  /// From the order in which points were met to that of their places.
-  void sort(Draft& draft, std::size_t vertices) {
-    ensures(places_.size() < kNothing, "a patch has too many points");
-    order_.resize(places_.size());
-    for (std::size_t k = 0; k < places_.size(); ++k)
-      order_[k] = {places_[k], k < vertices ? draft.vertices[k] : INT32_MAX,
-                   static_cast<std::uint16_t>(k)};
-    std::sort(order_.begin(), order_.end());
-    rank_.resize(places_.size());
-    std::vector<std::int32_t> sorted;
-    sorted.reserve(vertices);
-    draft.hanging_point.resize(draft.masters.size());
-    for (std::size_t rank = 0; rank < order_.size(); ++rank) {
-      const std::size_t k = std::get<2>(order_[rank]);
-      rank_[k] = static_cast<std::uint16_t>(rank);
-      if (k < vertices) {
-        sorted.push_back(draft.vertices[k]);
-        draft.vertex_point.push_back(rank_[k]);
-      } else {
-        draft.hanging_point[k - vertices] = rank_[k];
-      }
-    }
-    draft.vertices = std::move(sorted);
-    for (auto& masters : draft.masters)
-      for (std::uint16_t& m : masters) m = rank_[m];
-  }
-
-  const Level& level_;
-  std::vector<std::int32_t> first_;
-  std::vector<std::uint64_t> places_;  // of points as they were met: vertices, then hanging ones
-  std::vector<std::tuple<std::uint64_t, std::int32_t, std::uint16_t>> order_;
-  std::vector<std::uint16_t> rank_;
-  std::unordered_map<std::uint64_t, std::int32_t> hanging_;
-};
-
-/// Cells of a patch in groups. Of each kind those first that make rows of eight, then pairs of rows
-/// of four, then the others by fold.
-class Grouping {
- public:
-  Grouping(const Level& level, const std::vector<std::uint16_t>& kind_of, Draft& draft,
-           Numbering& numbering)
-      : level_(level), draft_(draft), cells_(draft.cells) {
-    std::sort(cells_.begin(), cells_.end(), [&](std::int32_t a, std::int32_t b) {
-      return std::tuple(kind_of[a], place_key(level.corner[a]), a) <
-             std::tuple(kind_of[b], place_key(level.corner[b]), b);
-    });
-    draft.cells = cells_;
-    numbering.number(draft, corners_, slots_);
-    nothing_ = static_cast<std::uint16_t>(draft.vertices.size() + draft.masters.size());
-    draft.cells.clear();
-    for (std::size_t begin = 0; begin < cells_.size();) {
-      std::size_t end = begin + 1;
-      while (end < cells_.size() && kind_of[cells_[end]] == kind_of[cells_[begin]]) ++end;
-      group_kind(begin, end, kind_of[cells_[begin]]);
-      begin = end;
-    }
-    put_slots();
-  }
-
- private:
-  /// Whether the points of the next cell continue those of cell n along x.
-  bool continues(std::size_t n) const {
-    const Corners &a = corners_[n], &b = corners_[n + 1];
-    for (std::size_t i = 0; i < 8; i += 2)
-      if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
-    return true;
-  }
-
-  void group_kind(std::size_t begin, std::size_t end, std::uint16_t kind) {
-    std::vector<std::size_t> halves, rest;
-    for (std::size_t i = begin; i < end;) {
-      std::size_t run = 1;
-      while (run < kGroup && i + run < end && continues(i + run - 1)) ++run;
-      if (run == kGroup)
-        for (std::size_t k = 0; k < run; ++k) put(i + k, kind, kRow);
-      else
-        for (std::size_t k = 0; k < run; ++k) (k < run / 4 * 4 ? halves : rest).push_back(i + k);
-      i += run;
-    }
-    if (halves.size() % kGroup != 0) {
-      rest.insert(rest.end(), halves.end() - 4, halves.end());
-      halves.erase(halves.end() - 4, halves.end());
-    }
-    for (const std::size_t n : halves) put(n, kind, kTwoRows);
-    const auto fold = [&](std::size_t n) { return level_.fold[cells_[n]]; };
-    std::stable_sort(rest.begin(), rest.end(),
-                     [&](std::size_t a, std::size_t b) { return fold(a) < fold(b); });
-    for (const std::size_t n : rest) put(n, kind, kScattered);
-    while (draft_.cells.size() % kGroup != 0) draft_.cells.push_back(-1);
-    index_.resize(draft_.cells.size());
-  }
-
-  void put(std::size_t n, std::uint16_t kind, RowKind row) {
-    const std::size_t k = draft_.cells.size() % kGroup, group = draft_.cells.size() / kGroup;
-    if (k == 0) {
-      draft_.kind.push_back(kind);
-      draft_.row.push_back(row);
-      draft_.folded.push_back(0);
-      draft_.corners.resize(draft_.corners.size() + 8 * kGroup, nothing_);
-    }
-    draft_.cells.push_back(cells_[n]);
-    index_.push_back(n);
-    for (std::size_t i = 0; i < 8; ++i)
-      draft_.corners[8 * kGroup * group + kGroup * i + k] = corners_[n][i];
-    if (!kernels::has_hanging(level_.fold[cells_[n]])) return;
-    draft_.folded[group] = 1;
-  }
-
-  /// Slots of the groups in which some corner hangs.
-  void put_slots() {
-    for (std::size_t g = 0; g < draft_.folded.size(); ++g) {
-      if (draft_.folded[g] == 0) continue;
-      const std::size_t at = draft_.slots.size();
-      draft_.slots.resize(at + 8 * kGroup, nothing_);
-      for (std::size_t k = 0; k < kGroup; ++k) {
-        const std::int32_t c = draft_.cells[kGroup * g + k];
-        if (c < 0) continue;
-        const Corners& from = slots_[index_[kGroup * g + k]];
-        for (std::size_t i = 0; i < 8; ++i) draft_.slots[at + kGroup * i + k] = from[i];
-      }
-    }
-  }
-
-  const Level& level_;
-  Draft& draft_;
-  std::vector<std::int32_t> cells_;  // in the order of corners_ and slots_
-  std::vector<Corners> corners_, slots_;
-  std::vector<std::size_t> index_;  // per lane, into these
-  std::uint16_t nothing_ = 0;
-};
-
-std::vector<std::uint16_t> number_kinds(const Hierarchy& hierarchy, PatchedLevel& out) {
-  std::vector<std::uint16_t> kind_of(hierarchy.values.size());
-  for (std::size_t c = 0; c < kind_of.size(); ++c) {
-    const CellValues& v = hierarchy.values[c];
-    const CellKind kind{v.stiffness, v.mass, hierarchy.spacing * (1 << out.level->size_log2[c]),
-                        v.material};
-    std::size_t k = c > 0 ? kind_of[c - 1] : 0;
-    if (k >= out.kinds.size() || !(out.kinds[k] == kind))
-      k = static_cast<std::size_t>(std::find(out.kinds.begin(), out.kinds.end(), kind) -
-                                   out.kinds.begin());
-    if (k == out.kinds.size()) out.kinds.push_back(kind);
-    expects(k < 65535, "the body has more than 65535 kinds of cells");
-    kind_of[c] = static_cast<std::uint16_t>(k);
-  }
-  return kind_of;
-}
-
-void find_held(const PatchedLevel* finer, PatchedLevel& out) {
-  const Level& level = *out.level;
-  out.held.assign(level.corner.size(), kFree);
-  for (std::int32_t c = 0; c < level.cells(); ++c) {
+  HeldCell held_of(std::int32_t c) const {
     bool partly = false, wholly = true;
-    if (finer == nullptr) {
-      for (const std::int32_t v : level.slots[c]) {
-        partly = partly || level.fixed[v] != 0;
-        wholly = wholly && level.fixed[v] == 7;
+    if (finer_ == nullptr) {
+      for (const std::int32_t v : level_.slots[c]) {
+        partly = partly || level_.fixed[v] != 0;
+        wholly = wholly && level_.fixed[v] == 7;
       }
     } else {
-      for (const std::int32_t child : level.children_of(c)) {
-        partly = partly || finer->held[child] == kPartlyHeld;
-        wholly = wholly && finer->held[child] == kWhollyHeld;
+      for (const std::int32_t child : level_.children_of(c)) {
+        partly = partly || finer_->held[child] == kPartlyHeld;
+        wholly = wholly && finer_->held[child] == kWhollyHeld;
       }
     }
-    out.held[c] = wholly ? kWhollyHeld : partly ? kPartlyHeld : kFree;
+    return wholly ? kWhollyHeld : partly ? kPartlyHeld : kFree;
   }
-}
 
-std::vector<std::uint16_t> stored_kinds(const PatchedLevel& finer, const PatchedLevel& out) {
-  const Level& level = *out.level;
-  std::vector<std::uint16_t> kind_of(level.corner.size(), kMerged);
-  for (std::int32_t c = 0; c < level.cells(); ++c) {
-    const auto children = level.children_of(c);
-    if (finer.level->place[children[0]] == kernels::kPassed) kind_of[c] = kPassed;
+  std::uint16_t kind_of(std::int32_t c) { return finer_ ? stored_kind(c) : finest_kind(c); }
+
+  std::uint16_t finest_kind(std::int32_t c) {
+    const CellValues& v = hierarchy_.values[c];
+    const CellKind kind{v.stiffness, v.mass, hierarchy_.spacing * (1 << level_.size_log2[c]),
+                        v.material};
+    std::vector<CellKind>& kinds = out_.kinds;
+    if (last_kind_ >= kinds.size() || !(kinds[last_kind_] == kind))
+      last_kind_ =
+          static_cast<std::size_t>(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
+    if (last_kind_ == kinds.size()) kinds.push_back(kind);
+    expects(last_kind_ < 65535, "the body has more than 65535 kinds of cells");
+    return static_cast<std::uint16_t>(last_kind_);
+  }
+
+  std::uint16_t stored_kind(std::int32_t c) const {
+    const auto children = level_.children_of(c);
+    const bool passed = finer_->level->place[children[0]] == Level::kPassed;
     unsigned octants = 0;  // without duplication two children can have one
     bool twice = false;
     for (const std::int32_t child : children) {
-      const unsigned bit = 1U << (finer.level->place[child] % 8);
+      const unsigned bit = 1U << (finer_->level->place[child] % 8);
       twice = twice || (octants & bit) != 0;
       octants |= bit;
     }
-    const bool held = out.held[c] == kPartlyHeld;
-    const bool masks = held && finer.children.empty();  // children of level 0
-    if (held) kind_of[c] = kind_of[c] == kPassed ? kHeldPassed : kHeldMerged;
-    if (masks || twice) kind_of[c] = kGeneral;
+    const bool held = out_.held[c] == kPartlyHeld;
+    const bool masks = held && finer_->children.empty();  // children of level 0
+    if (masks || twice) return kGeneral;
+    if (held) return passed ? kHeldPassed : kHeldMerged;
+    return passed ? kPassed : kMerged;
   }
-  return kind_of;
-}
 
-void place_children(const PatchedLevel& finer, PatchedLevel& out) {
-  const Level& level = *out.level;
-  out.children.assign(8 * out.cell.size(), -1);
-  for (std::size_t lane = 0; lane < out.cell.size(); ++lane) {
-    const std::int32_t c = out.cell[lane];
-    if (c < 0) continue;
-    for (const std::int32_t child : level.children_of(c)) {
-      if (finer.held[child] == kWhollyHeld) continue;
-      const std::size_t octant = finer.level->place[child] % 8;  // kPassed: 0
-      out.children[8 * kGroup * (lane / kGroup) + kGroup * octant + lane % kGroup] =
-          finer.lane[child];
+  // --- which patches are made ------------------------------------------------------------------
+
+  void add_patch(const std::vector<std::int32_t>& cells) {
+    out_.patches.emplace_back();
+    add_draft(size_of(out_.patches.size()) - 1, cells);
+  }
+  void add_draft(std::int32_t patch, const std::vector<std::int32_t>& cells) {
+    Draft draft;
+    draft.patch = patch;
+    draft.cells = cells;
+    for (const std::int32_t c : cells) draft.kind_of.push_back(kind_of(c));
+    drafts_.push_back(std::move(draft));
+  }
+
+  std::int32_t patch_of(std::int32_t c) const {
+    const std::int32_t before = change_->cells_before;
+    return out_.patch_of_cell(c < before ? c : change_->origin[c - before]);
+  }
+
+  void mark(const LevelChange& change, const LevelChange* above, const PatchMoves* below) {
+    dirty_.assign(out_.patches.size(), false);
+    arrived_.resize(out_.patches.size());
+    for (std::int32_t c = change.cells_before; c < level_.cells(); ++c)
+      arrived_[patch_of(c)].push_back(c);
+    for (const std::int32_t c : change.cells) touch(c);
+    for (const std::int32_t v : change.vertices)
+      for (const std::int32_t item : level_.incidences_of(v)) touch(item / 8);
+    if (below != nullptr)
+      for (const std::int32_t child : below->held) touch(finer_->level->parent[child]);
+    if (above != nullptr)  // rows of the transfer
+      for (const std::int32_t parent : above->cells)
+        for (const std::int32_t c : next_->children_of(parent)) dirty_[patch_of(c)] = true;
+  }
+
+  void touch(std::int32_t c) {
+    dirty_[patch_of(c)] = true;
+    const HeldCell held = held_of(c);
+    if (held == out_.held[c] && c < change_->cells_before) return;
+    out_.held[c] = held;
+    moves_.held.push_back(c);
+  }
+
+  /// Again, and in several parts if it has grown much.
+  void draft_patch(std::int32_t p) {
+    dirty_[p] = true;
+    std::vector<std::int32_t> cells;
+    const Range groups = out_.patches[p].groups;
+    for (std::int32_t lane = kGroup * groups.first; lane < kGroup * groups.end(); ++lane)
+      if (out_.cell[lane] >= 0) cells.push_back(out_.cell[lane]);
+    cells.insert(cells.end(), arrived_[p].begin(), arrived_[p].end());
+    if (size_of(cells.size()) <= kMostCells + kMostCells / 2) return add_draft(p, cells);
+    const auto parts = divide(level_, cells, kMostCells);
+    add_draft(p, parts[0]);
+    for (std::size_t i = 1; i < parts.size(); ++i) add_patch(parts[i]);
+    dirty_.resize(out_.patches.size(), true);
+    arrived_.resize(out_.patches.size());
+  }
+
+  void make_drafts(std::size_t begin) {
+    const std::int32_t count = size_of(drafts_.size());
+#pragma omp parallel num_threads(threads_) if (count - size_of(begin) > 1)
+    {
+      Numbering numbering(level_);
+#pragma omp for schedule(dynamic, 1)
+      for (std::int32_t i = size_of(begin); i < count; ++i)
+        make_draft(level_, drafts_[i], numbering);
     }
   }
-}
 
-/// Cells along a curve that stays within cubes, cut into patches.
-std::vector<Draft> divide(const Level& level) {
-  std::vector<std::pair<std::uint64_t, std::int32_t>> order(level.corner.size());
-  for (std::int32_t c = 0; c < level.cells(); ++c) order[c] = {morton(level.corner[c]), c};
-  std::sort(order.begin(), order.end());
-  const std::int32_t size = patch_cells(level.cells());
-  std::vector<Draft> drafts(static_cast<std::size_t>((level.cells() + size - 1) / size));
-  for (std::size_t i = 0; i < order.size(); ++i)
-    drafts[i / static_cast<std::size_t>(size)].cells.push_back(order[i].second);
-  return drafts;
-}
+  // --- vertices --------------------------------------------------------------------------------
 
-void fill_to_tile(std::vector<std::int32_t>& vertices) {
-  while (vertices.size() % kGroup != 0) vertices.push_back(-1);
-}
+  /// The patch that has a vertex alone, or less than zero.
+  std::int32_t home_of(std::int32_t v) const {
+    const std::int32_t packed = out_.packed[v];
+    return packed < 0 ? -1 : out_.home[packed / kGroup];
+  }
 
-/// Packed numbers: own vertices patch by patch, shared ones, one tile of nothing.
-void number_vertices(std::vector<Draft>& drafts, PatchedLevel& out) {
-  const Level& level = *out.level;
-  constexpr std::int32_t kNone = -1, kShared = -2;
-  std::vector<std::int32_t> owner(level.point.size(), kNone);
-  for (std::size_t p = 0; p < drafts.size(); ++p)
-    for (const std::int32_t v : drafts[p].vertices)
-      owner[v] = owner[v] == kNone ? size_of(p) : kShared;
-  for (std::size_t p = 0; p < drafts.size(); ++p) {
-    Patch& patch = out.patches[p];
-    patch.first_own = size_of(out.vertex.size());
-    const std::vector<std::int32_t>& vertices = drafts[p].vertices;
-    const auto nothing = static_cast<std::uint16_t>(vertices.size() + drafts[p].masters.size());
-    for (std::size_t k = 0; k < vertices.size(); ++k) {
-      if (owner[vertices[k]] != size_of(p)) continue;
-      out.vertex.push_back(vertices[k]);
-      out.own_point.push_back(drafts[p].vertex_point[k]);
+  /// Appends tiles; returns their first vertex.
+  std::int32_t add_tiles(std::int32_t tiles, std::int32_t home) {
+    const std::size_t size = out_.vertex.size() + static_cast<std::size_t>(kGroup * tiles);
+    const auto first = size_of(out_.vertex.size());
+    out_.vertex.resize(size, -1);
+    out_.fixed.resize(size, 0);
+    out_.own_point.resize(size, 0);
+    out_.home.resize(size / kGroup, home);
+    return first;
+  }
+
+  std::int32_t add_shared() {
+    if (out_.shared % kGroup == 0)
+      out_.shared_tiles.push_back(
+          add_tiles(1, PatchedLevel::shared_home(out_.shared_tiles.size())) / kGroup);
+    const std::int32_t tile = out_.shared_tiles.back();
+    return kGroup * tile + out_.shared++ % kGroup;
+  }
+
+  void share(std::int32_t v) {
+    const std::int32_t from = out_.packed[v], to = add_shared();
+    if (from >= 0) {
+      out_.vertex[from] = -1;
+      out_.fixed[from] = 0;
+      moves_.vertices.push_back({from, to});
     }
-    fill_to_tile(out.vertex);
-    out.own_point.resize(out.vertex.size(), nothing);
-    patch.own = size_of(out.vertex.size()) - patch.first_own;
+    out_.packed[v] = to;
+    out_.vertex[to] = v;
   }
-  out.first_shared = size_of(out.vertex.size());
-  for (std::int32_t v = 0; v < level.vertices(); ++v)
-    if (owner[v] == kShared) out.vertex.push_back(v);
-  fill_to_tile(out.vertex);
-  out.vertex.resize(out.vertex.size() + kGroup, -1);
-  out.packed.assign(level.point.size(), -1);
-  out.fixed.assign(out.vertex.size(), 0);
-  for (std::size_t k = 0; k < out.vertex.size(); ++k) {
-    if (out.vertex[k] < 0) continue;
-    out.packed[out.vertex[k]] = size_of(k);
-    out.fixed[k] = level.fixed[out.vertex[k]];
-  }
-}
 
-/// Which points of patches are the shared vertices, and back.
-void number_copies(const std::vector<Draft>& drafts, PatchedLevel& out) {
-  const std::size_t shared = out.vertex.size() - static_cast<std::size_t>(out.first_shared);
-  out.copies_begin.assign(shared + 1, 0);
-  for (std::size_t p = 0; p < drafts.size(); ++p) {
-    Patch& patch = out.patches[p];
-    patch.first_copy = size_of(out.copy_point.size());
-    const std::vector<std::int32_t>& vertices = drafts[p].vertices;
-    for (std::size_t k = 0; k < vertices.size(); ++k) {
-      const std::int32_t packed = out.packed[vertices[k]];
-      if (packed < out.first_shared) continue;
-      out.copy_point.push_back(drafts[p].vertex_point[k]);
-      out.copy_vertex.push_back(packed);
-      ++out.copies_begin[static_cast<std::size_t>(packed - out.first_shared) + 1];
+  /// A vertex that a second patch has becomes a shared one, and stays so.
+  void find_shared() {
+    for (const Draft& draft : drafts_)
+      for (const std::int32_t v : draft.vertices) {
+        const std::int32_t packed = out_.packed[v];
+        if (packed == -1) {
+          out_.packed[v] = claim(draft.patch);
+        } else if (packed < 0) {
+          share(v);
+        } else if (const std::int32_t home = out_.home[packed / kGroup];
+                   home >= 0 && home != draft.patch) {
+          share(v);
+        }
+      }
+  }
+
+  /// New own vertices, in the places that others left where there are such.
+  void place_own(const Draft& draft) {
+    Range& own = out_.patches[draft.patch].own;
+    std::vector<std::int32_t> fresh, kept;
+    for (const std::int32_t v : draft.vertices)
+      if (out_.packed[v] == claim(draft.patch)) fresh.push_back(v);
+    for (std::int32_t at = own.first; at < own.end(); ++at)
+      if (out_.vertex[at] >= 0) kept.push_back(at);
+    const std::size_t need = (kept.size() + fresh.size() + kGroup - 1) / kGroup;
+    if (size_of(kGroup * need) > own.room) move_own(draft.patch, need, kept);
+    std::int32_t at = own.first;
+    for (const std::int32_t v : fresh) {
+      while (out_.vertex[at] >= 0) ++at;
+      out_.vertex[at] = v;
+      out_.packed[v] = at;
     }
-    patch.copies = size_of(out.copy_point.size()) - patch.first_copy;
+    const std::int32_t end = fresh.empty() ? own.first : at / kGroup * kGroup + kGroup;
+    own.size = std::max(own.size, end - own.first);
   }
-  std::partial_sum(out.copies_begin.begin(), out.copies_begin.end(), out.copies_begin.begin());
-  std::vector<std::int32_t> next(out.copies_begin.begin(), out.copies_begin.end() - 1);
-  out.copies_of.resize(out.copy_vertex.size());
-  for (std::size_t k = 0; k < out.copy_vertex.size(); ++k)
-    out.copies_of[next[out.copy_vertex[k] - out.first_shared]++] = size_of(k);
-}
 
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
-
-/// Cells and hanging corners of all patches, one after the other.
-void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
-  for (std::size_t p = 0; p < drafts.size(); ++p) {
-    const Draft& draft = drafts[p];
-    Patch& patch = out.patches[p];
-    patch.first_group = size_of(out.groups());
-    patch.groups = size_of(draft.cells.size() / kGroup);
-    patch.first_hanging = size_of(out.hanging_masters.size());
-    patch.hanging = size_of(draft.masters.size());
-    patch.points = size_of(draft.vertices.size()) + patch.hanging + 1;
-    std::int32_t at = size_of(out.slots.size() / (8 * kGroup));
-    for (const std::uint8_t folded : draft.folded) out.slots_at.push_back(folded ? at++ : -1);
-    append(out.cell, draft.cells);
-    append(out.corners, draft.corners);
-    append(out.slots, draft.slots);
-    append(out.row, draft.row);
-    append(out.kind, draft.kind);
-    append(out.hanging_point, draft.hanging_point);
-    append(out.hanging_masters, draft.masters);
-  }
-  out.lane.assign(out.level->corner.size(), -1);
-  for (std::size_t lane = 0; lane < out.cell.size(); ++lane)
-    if (out.cell[lane] >= 0) out.lane[out.cell[lane]] = size_of(lane);
-}
-
-using Weights = std::array<std::array<float, 8>, 8>;
-
-/// The weights between slots of a child and of its parent; there are few different ones.
-class WeightTable {
- public:
-  const Weights& operator()(kernels::FoldCode child, int place, kernels::FoldCode parent) {
-    const std::uint64_t key = std::uint64_t{child} | std::uint64_t{parent} << 16 |
-                              std::uint64_t(static_cast<unsigned>(place)) << 32;
-    const auto [entry, added] = known_.try_emplace(key);
-    if (added) {
-      float w[8][8];
-      kernels::transfer_weights(child, place, parent, w);
-      for (std::size_t i = 0; i < 8; ++i) std::copy_n(w[i], 8, entry->second[i].begin());
+  void move_own(std::int32_t patch, std::size_t tiles, const std::vector<std::int32_t>& kept) {
+    Range& own = out_.patches[patch].own;
+    const Range before = own;
+    const auto room = size_of(own.room == 0 ? tiles : tiles + tiles / 4);
+    own.first = add_tiles(room, patch);
+    own.room = kGroup * room;
+    own.size = size_of(kGroup * ((kept.size() + kGroup - 1) / kGroup));
+    std::int32_t to = own.first;
+    for (const std::int32_t from : kept) {
+      const std::int32_t v = out_.vertex[from];
+      out_.vertex[to] = v;
+      out_.packed[v] = to;
+      moves_.vertices.push_back({from, to++});
     }
-    return entry->second;
+    for (std::int32_t at = before.first; at < before.first + before.room; ++at) {
+      out_.vertex[at] = -1;
+      out_.fixed[at] = 0;
+      out_.home[at / kGroup] = PatchedLevel::kNowhere;
+    }
   }
 
- private:
-  std::unordered_map<std::uint64_t, Weights> known_;
+  // --- arrays ----------------------------------------------------------------------------------
+
+  void place() {
+    if (!anew_) leave();
+    find_shared();
+    for (const Draft& draft : drafts_) place_own(draft);
+    fit_ranges();
+    const std::int32_t count = size_of(drafts_.size());
+#pragma omp parallel for num_threads(threads_) schedule(static) if (count > 1)
+    for (std::int32_t i = 0; i < count; ++i) {
+      write_cells(drafts_[i]);
+      write_points(drafts_[i]);
+    }
+    list_copies();
+    if (finer_ != nullptr) place_children();
+    std::vector<std::int32_t> made;
+    for (const Draft& draft : drafts_) made.push_back(draft.patch);
+    if (next_ != nullptr) place_transfers(made, *next_, threads_, out_);
+  }
+
+  /// Notes where cells were; takes copies off the lists, and cells off the arrays.
+  void leave() {
+    Rows copies(out_.copies_begin, out_.copies_of, out_.copy_rows);
+    for (const Draft& draft : drafts_) {
+      const Patch& patch = out_.patches[draft.patch];
+      for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
+        copies.remove(out_.shared_number(out_.copy_vertex[k]), k);
+      moves_.groups.push_back(patch.groups);
+      for (std::int32_t g = patch.groups.first; g < patch.groups.first + patch.groups.room; ++g)
+        empty_group(g);
+    }
+    const std::int32_t before = change_->cells_before;
+    for (const Draft& draft : drafts_)
+      for (const std::int32_t c : draft.cells)
+        if (c >= 0)
+          moves_.cells.push_back({out_.lane[c < before ? c : change_->origin[c - before]], c});
+  }
+
+  void empty_group(std::int32_t g) {
+    std::fill_n(out_.cell.begin() + kGroup * g, kGroup, -1);
+    out_.kind[g] = kNoCells;
+    out_.row[g] = kScattered;
+    out_.slots_at[g] = -1;
+    out_.patch_of[g] = -1;
+  }
+
+  void fit_ranges() {
+    std::int32_t groups = size_of(out_.groups()), copies = size_of(out_.copy_point.size()),
+                 hanging = size_of(out_.hanging_point.size()),
+                 folded = size_of(out_.slots.size() / (8 * kGroup));
+    for (const Draft& draft : drafts_) {
+      Patch& patch = out_.patches[draft.patch];
+      const auto shared =
+          std::count_if(draft.vertices.begin(), draft.vertices.end(), [&](std::int32_t v) {
+            return PatchedLevel::is_shared(out_.home[out_.packed[v] / kGroup]);
+          });
+      patch.groups.fit(draft.row.size(), groups);
+      patch.copies.fit(static_cast<std::size_t>(shared), copies);
+      patch.hanging.fit(draft.masters.size(), hanging);
+      patch.folded.fit(draft.slots.size() / (8 * kGroup), folded);
+      patch.points = draft.points();
+      moves_.groups.push_back(patch.groups);
+    }
+    const auto all = static_cast<std::size_t>(groups);
+    out_.cell.resize(kGroup * all, -1);
+    out_.corners.resize(8 * kGroup * all, 0);
+    out_.kind.resize(all, kNoCells);
+    out_.row.resize(all, kScattered);
+    out_.slots_at.resize(all, -1);
+    out_.patch_of.resize(all, -1);
+    if (finer_ != nullptr) out_.children.resize(8 * kGroup * all, -1);
+    out_.copy_point.resize(static_cast<std::size_t>(copies));
+    out_.copy_vertex.resize(static_cast<std::size_t>(copies));
+    out_.hanging_point.resize(static_cast<std::size_t>(hanging));
+    out_.hanging_masters.resize(static_cast<std::size_t>(hanging));
+    out_.slots.resize(8 * kGroup * static_cast<std::size_t>(folded));
+    if (anew_) out_.groups_built = all, out_.tiles_built = out_.tiles();
+  }
+
+  void write_cells(const Draft& draft) {
+    const Patch& patch = out_.patches[draft.patch];
+    const std::int32_t first = patch.groups.first;
+    put(draft.cells, kGroup * first, out_.cell);
+    put(draft.corners, 8 * kGroup * first, out_.corners);
+    put(draft.kind, first, out_.kind);
+    put(draft.row, first, out_.row);
+    put(draft.slots, 8 * kGroup * patch.folded.first, out_.slots);
+    std::int32_t slots = patch.folded.first;
+    for (std::size_t g = 0; g < draft.folded.size(); ++g) {
+      out_.slots_at[static_cast<std::size_t>(first) + g] = draft.folded[g] != 0 ? slots++ : -1;
+      out_.patch_of[static_cast<std::size_t>(first) + g] = draft.patch;
+    }
+    for (std::size_t k = 0; k < draft.cells.size(); ++k)
+      if (draft.cells[k] >= 0) out_.lane[draft.cells[k]] = kGroup * first + size_of(k);
+  }
+
+  void write_points(const Draft& draft) {
+    const Patch& patch = out_.patches[draft.patch];
+    std::fill_n(out_.own_point.begin() + patch.own.first, patch.own.size, draft.nothing());
+    std::int32_t k = patch.copies.first;
+    for (std::size_t n = 0; n < draft.vertices.size(); ++n) {
+      const std::int32_t packed = out_.packed[draft.vertices[n]];
+      if (out_.home[packed / kGroup] == draft.patch) {
+        out_.own_point[packed] = draft.vertex_point[n];
+      } else {
+        out_.copy_point[k] = draft.vertex_point[n];
+        out_.copy_vertex[k++] = packed;
+      }
+    }
+    put(draft.hanging_point, patch.hanging.first, out_.hanging_point);
+    put(draft.masters, patch.hanging.first, out_.hanging_masters);
+  }
+
+  /// The copies of each shared vertex.
+  void list_copies() {
+    for (const Draft& draft : drafts_)
+      for (const std::int32_t v : draft.vertices) out_.fixed[out_.packed[v]] = level_.fixed[v];
+    if (anew_) return list_all_copies();
+    Rows copies(out_.copies_begin, out_.copies_of, out_.copy_rows);
+    while (size_of(out_.copies_begin.size()) - 1 < out_.shared) copies.append({});
+    for (const Draft& draft : drafts_) {
+      const Range& range = out_.patches[draft.patch].copies;
+      for (std::int32_t k = range.first; k < range.end(); ++k)
+        copies.insert(out_.shared_number(out_.copy_vertex[k]), k);
+    }
+    copies.pack_if_wasteful();
+  }
+
+  void list_all_copies() {
+    out_.copies_begin.assign(static_cast<std::size_t>(out_.shared) + 1, 0);
+    for (const std::int32_t v : out_.copy_vertex)
+      ++out_.copies_begin[static_cast<std::size_t>(out_.shared_number(v)) + 1];
+    std::partial_sum(out_.copies_begin.begin(), out_.copies_begin.end(), out_.copies_begin.begin());
+    std::vector<std::int32_t> next(out_.copies_begin.begin(), out_.copies_begin.end() - 1);
+    out_.copies_of.resize(out_.copy_vertex.size());
+    for (std::size_t k = 0; k < out_.copy_vertex.size(); ++k)
+      out_.copies_of[next[out_.shared_number(out_.copy_vertex[k])]++] = size_of(k);
+  }
+
+  // --- children --------------------------------------------------------------------------------
+
+  void place_child(std::int32_t child) {
+    const std::int32_t lane = out_.lane[level_of_finer().parent[child]];
+    const std::size_t octant = level_of_finer().place[child] % 8;  // kPassed: 0
+    const auto group = static_cast<std::size_t>(lane / kGroup);
+    out_.children[8 * kGroup * group + kGroup * octant + lane % kGroup] =
+        finer_->held[child] == kWhollyHeld ? -1 : finer_->lane[child];
+  }
+  const Level& level_of_finer() const { return *finer_->level; }
+
+  void place_children() {
+    for (const Draft& draft : drafts_) {
+      const Range& groups = out_.patches[draft.patch].groups;
+      std::fill_n(out_.children.begin() + 8 * kGroup * std::ptrdiff_t{groups.first},
+                  8 * kGroup * std::ptrdiff_t{groups.size}, -1);
+      for (const std::int32_t c : draft.cells) {
+        if (c < 0) continue;
+        for (const std::int32_t child : level_.children_of(c)) place_child(child);
+      }
+    }
+  }
+
+  /// Those of patches that stayed as they were.
+  void place_moved_children(const PatchMoves& below) {
+    for (const Range& groups : below.groups)
+      for (std::int32_t lane = kGroup * groups.first; lane < kGroup * groups.end(); ++lane)
+        if (const std::int32_t child = finer_->cell[lane]; child >= 0) place_child(child);
+  }
+
+  const Hierarchy& hierarchy_;
+  const Level& level_;
+  const Level* next_;
+  const PatchedLevel* finer_;
+  int threads_;
+  PatchedLevel& out_;
+  bool anew_ = false;
+  const LevelChange* change_ = nullptr;
+  std::vector<bool> dirty_;                         // per patch
+  std::vector<std::vector<std::int32_t>> arrived_;  // new cells, per patch
+  std::vector<Draft> drafts_;
+  PatchMoves moves_;
+  std::size_t last_kind_ = 0;
 };
-
-/// The columns of `rows`, as rows: what coarse vertices take from fine ones.
-SparseWeights transposed(const SparseWeights& rows, std::size_t columns) {
-  SparseWeights out;
-  out.begin.assign(columns + 1, 0);
-  for (const std::int32_t c : rows.vertex) ++out.begin[static_cast<std::size_t>(c) + 1];
-  std::partial_sum(out.begin.begin(), out.begin.end(), out.begin.begin());
-  std::vector<std::int32_t> next(out.begin.begin(), out.begin.end() - 1);
-  out.vertex.resize(rows.vertex.size());
-  out.weight.resize(rows.weight.size());
-  for (std::size_t v = 0; v + 1 < rows.begin.size(); ++v)
-    for (std::int32_t k = rows.begin[v]; k < rows.begin[v + 1]; ++k) {
-      const std::int32_t at = next[rows.vertex[k]]++;
-      out.vertex[at] = size_of(v);
-      out.weight[at] = rows.weight[k];
-    }
-  return out;
-}
 
 }  // namespace
 
+void Range::fit(std::size_t count, std::int32_t& end) {
+  size = size_of(count);
+  if (size <= room) return;
+  const std::int32_t more = room == 0 ? size : size + size / 4;
+  first = end;
+  room = more;
+  end += more;
+}
+
 std::size_t PatchedLevel::bytes() const {
   return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) +
-         bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) + bytes_of(slots) + bytes_of(vertex) +
-         bytes_of(packed) + bytes_of(fixed) + bytes_of(own_point) + bytes_of(copy_point) +
-         bytes_of(copy_vertex) + bytes_of(hanging_point) + bytes_of(hanging_masters) +
-         bytes_of(copies_begin) + bytes_of(copies_of) + bytes_of(prolong.begin) +
-         bytes_of(prolong.vertex) + bytes_of(prolong.weight) + bytes_of(restrict_.begin) +
-         bytes_of(restrict_.vertex) + bytes_of(restrict_.weight) + bytes_of(held) +
-         bytes_of(children);
+         bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) + bytes_of(patch_of) +
+         bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
+         bytes_of(own_point) + bytes_of(home) + bytes_of(copy_point) + bytes_of(copy_vertex) +
+         bytes_of(hanging_point) + bytes_of(hanging_masters) + bytes_of(shared_tiles) +
+         bytes_of(copies_begin) + bytes_of(copies_of) + bytes_of(copy_rows.count) +
+         transfer.bytes() + bytes_of(held) + bytes_of(children);
 }
 
 PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
                           int threads) {
   PatchedLevel out;
-  out.level = &hierarchy.levels[index];
-  const Level& level = *out.level;
-  find_held(finer, out);
-  const std::vector<std::uint16_t> kind_of =
-      finer == nullptr ? number_kinds(hierarchy, out) : stored_kinds(*finer, out);
-  std::vector<Draft> drafts = divide(level);
-  out.patches.resize(drafts.size());
-  const auto count = size_of(drafts.size());
-#pragma omp parallel num_threads(threads) if (count > 1)
-  {
-    Numbering numbering(level);
-#pragma omp for schedule(dynamic, 1)
-    for (std::int32_t p = 0; p < count; ++p) Grouping(level, kind_of, drafts[p], numbering);
-  }
-  number_vertices(drafts, out);
-  number_copies(drafts, out);
-  join(drafts, out);
-  if (finer != nullptr) place_children(*finer, out);
+  Patcher(hierarchy, index, finer, threads, out).make();
   return out;
 }
 
-// By the first cell that meets each vertex; all of them agree.
-void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine) {
-  const Level& level = *fine.level;
-  std::vector<std::int32_t> first(level.point.size(), -1);
-  for (std::int32_t c = 0; c < level.cells(); ++c)
-    for (std::size_t i = 0; i < 8; ++i)
-      if (first[level.slots[c][i]] < 0) first[level.slots[c][i]] = 8 * c + size_of(i);
-  WeightTable table;
-  SparseWeights& rows = fine.prolong;
-  rows.begin.push_back(0);
-  for (const std::int32_t v : fine.vertex) {
-    if (v >= 0) {
-      const std::int32_t child = first[v] / 8, parent = level.parent[child];
-      const auto& w = table(level.fold[child], level.place[child],
-                            coarse.level->fold[parent])[static_cast<std::size_t>(first[v] % 8)];
-      for (std::size_t m = 0; m < 8; ++m) {
-        if (w[m] == 0) continue;
-        rows.vertex.push_back(coarse.packed[coarse.level->slots[parent][m]]);
-        rows.weight.push_back(w[m]);
-      }
-    }
-    rows.begin.push_back(size_of(rows.vertex.size()));
+/// The same for a level whose arrays have become long beside what is in them.
+PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change, std::size_t index,
+                          const PatchedLevel* finer, int threads, PatchedLevel& level) {
+  const PatchedLevel before = std::move(level);
+  level = make_patches(hierarchy, index, finer, threads);
+  PatchMoves moves;
+  for (std::size_t v = 0; v < before.packed.size(); ++v)
+    moves.vertices.push_back({before.packed[v], level.packed[v]});
+  for (std::int32_t c = 0; c < level.level->cells(); ++c) {
+    const std::int32_t old = change.cells_before;
+    moves.cells.push_back({before.lane[c < old ? c : change.origin[c - old]], c});
+    moves.held.push_back(c);
   }
-  fine.restrict_ = transposed(rows, coarse.vertices());
+  for (const Patch& patch : level.patches) moves.groups.push_back(patch.groups);
+  return moves;
+}
+
+PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,
+                          std::size_t index, const PatchedLevel* finer, const PatchMoves* below,
+                          int threads, PatchedLevel& level) {
+  if (level.groups() > 2 * level.groups_built || level.tiles() > 2 * level.tiles_built)
+    return remake_patches(hierarchy, change.levels[index], index, finer, threads, level);
+  return Patcher(hierarchy, index, finer, threads, level).update(change, index, below);
 }
 
 }  // namespace kerf::cpu

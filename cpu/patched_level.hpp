@@ -5,36 +5,31 @@
 // runs in the cache and adds in a fixed order, whichever thread does it.
 //
 // Vertices  are numbered anew ("packed"): those that only one patch has, patch by patch, then those
-//           that patches share; each range is filled up to a multiple of eight with vertices that
-//           are nothing, and one such tile is the last. What belongs to nothing is zero and stays
-//           so. Vectors hold tiles of eight vertices:  [tile][component][8].
+//           that patches share; vectors hold tiles of eight vertices, [tile][component][8]. What
+//           is left of a tile is nothing, which is zero and stays so.
 // Points    of a patch: its vertices, its hanging corners, and last one that is nothing. A hanging
 //           corner is the mean of four of the points (each of two counts twice on an edge).
 // Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
 //           nothing for corners. The cells of a group are of one kind.
 //
-// Cuts and hanging corners need nothing beyond the numbers of points.
+// Cuts and hanging corners need nothing beyond the numbers of points. After a cut, patches that it
+// touched are made again where they were, or at the end of the arrays if they need more room.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/levels/hierarchy.hpp"
+#include "core/levels/update.hpp"
 #include "cpu/pack.hpp"
 
 namespace kerf::cpu {
 
 inline constexpr int kGroup = 8;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
-
-/// What a vertex takes from those of another level: rows of a sparse matrix.
-struct SparseWeights {
-  std::vector<std::int32_t> begin;   // per row + 1
-  std::vector<std::int32_t> vertex;  // packed, of the other level
-  std::vector<float> weight;         // multiples of 1/64: exact
-};
 
 /// How the matrix of a cell of a stored level comes about; cells of a group are alike.
 enum StoredKind : std::uint16_t {
@@ -43,7 +38,8 @@ enum StoredKind : std::uint16_t {
   // Where some cell of level 0 below is partly held:
   kHeldMerged,  ///< from children above level 0, one an octant
   kHeldPassed,  ///< from one cell above level 0
-  kGeneral      ///< from cells of level 0, or two children have one octant
+  kGeneral,     ///< from cells of level 0, or two children have one octant
+  kNoCells
 };
 
 /// Whether components of the vertices of a cell are held. A wholly held cell takes no part in any
@@ -57,6 +53,16 @@ enum RowKind : std::uint8_t {
   kRow       ///< the whole group is one
 };
 
+/// The part of an array that belongs to one patch. What lies between its size and its room is
+/// nothing.
+struct Range {
+  std::int32_t first = 0, size = 0, room = 0;
+
+  std::int32_t end() const { return first + size; }
+  /// Room for `count` entries, at the `end` of the array where there is too little.
+  void fit(std::size_t count, std::int32_t& end);
+};
+
 /// What cells of level 0 have in common.
 struct CellKind {
   double stiffness = 0, mass = 0, side = 0;  // E side, density side^3, m
@@ -66,11 +72,44 @@ struct CellKind {
 };
 
 struct Patch {
-  std::int32_t first_group = 0, groups = 0;
-  std::int32_t first_own = 0, own = 0;          // packed vertices: multiples of eight
-  std::int32_t first_copy = 0, copies = 0;      // points that are shared vertices
-  std::int32_t first_hanging = 0, hanging = 0;  // into hanging_point
+  Range groups;
+  Range own;      // packed vertices of this patch alone: whole tiles
+  Range copies;   // points that are shared vertices
+  Range hanging;  // hanging points
+  Range folded;   // blocks of slots
   std::int32_t points = 0;
+};
+
+/// What the vertices of a patch take from those of the next level, in numbers of its own for
+/// these: its points. The row of a shared vertex is in one patch: that of its first cell.
+struct TransferPart {
+  Range points;
+  Range terms;  // those of own vertices in their order, then those of leads; and again by point
+  Range leads;  // shared vertices
+  std::int32_t first_lead_term = 0;
+};
+
+/// Between the vertices of a level and of the next.
+struct Transfer {
+  std::vector<TransferPart> parts;        // per patch
+  std::vector<std::int32_t> point;        // the vertex of the next level, in its own numbers
+  std::vector<std::uint16_t> term_point;  // within the part
+  std::vector<std::uint8_t> term_weight;  // 64ths: exact
+  std::vector<std::int32_t> first_term;   // per tile of own vertices
+  std::vector<std::uint8_t> terms;        // per packed vertex: how many
+  std::vector<std::int32_t> lead;         // packed
+  std::vector<std::uint8_t> lead_terms;
+  std::vector<std::uint16_t> point_terms;  // per point: how many
+  std::vector<std::uint16_t> given_row;    // the same terms by point: a vertex among those of the
+  std::vector<std::uint8_t> given_weight;  // part, own ones first
+  std::vector<std::int32_t> giver_begin, givers;  // per vertex of the next level: its points
+  RowState giver_rows;
+
+  /// The points that stand for a vertex of the next level.
+  std::span<const std::int32_t> givers_of(std::int32_t next_vertex) const {
+    return row_of(giver_begin, givers, giver_rows, next_vertex);
+  }
+  std::size_t bytes() const;
 };
 
 struct PatchedLevel {
@@ -84,30 +123,48 @@ struct PatchedLevel {
   std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
   std::vector<std::uint8_t> row;       // per group: RowKind
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
+  std::vector<std::int32_t> patch_of;  // per group, -1: none
   std::vector<std::uint16_t> slots;    // [folded group][8][8]: points
 
   std::vector<std::int32_t> vertex;      // per packed vertex: that of the level, -1: none
   std::vector<std::int32_t> packed;      // per vertex of the level
   std::vector<std::uint8_t> fixed;       // per packed vertex, as Level::fixed
   std::vector<std::uint16_t> own_point;  // per packed vertex that is not shared
+  std::vector<std::int32_t> home;        // per tile: its patch, kNowhere, or shared_home(n)
   std::vector<std::uint16_t> copy_point;
   std::vector<std::int32_t> copy_vertex;  // packed
   std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> hanging_masters;
-  std::int32_t first_shared = 0;           // packed
-  std::vector<std::int32_t> copies_begin;  // per shared packed vertex + 1
-  std::vector<std::int32_t> copies_of;     // ascending
+  std::vector<std::int32_t> shared_tiles;  // filled one after the other
+  std::int32_t shared = 0;                 // vertices: a place in these tiles, its number
+  std::vector<std::int32_t> copies_begin, copies_of;  // per shared vertex, ascending
+  RowState copy_rows;
 
-  SparseWeights prolong;               // rows: packed vertices; columns: of the next level
-  SparseWeights restrict_;             // rows: packed vertices of the next level
+  Transfer transfer;                   // to the next level
   std::vector<std::uint8_t> held;      // per cell: HeldCell, of it or of the cells below
   std::vector<std::int32_t> children;  // [group][octant][8], above level 0: lanes of the level
                                        // before, -1: none, or wholly held; passed: octant 0
+  std::size_t groups_built = 0, tiles_built = 0;  // when patches were last made from nothing
+
+  static constexpr std::int32_t kNowhere = -1;
+  static std::int32_t shared_home(std::size_t n) { return -2 - static_cast<std::int32_t>(n); }
+  static bool is_shared(std::int32_t home) { return home < kNowhere; }
 
   bool folded(std::size_t group) const { return slots_at[group] >= 0; }
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
   std::size_t tiles() const { return vertex.size() / kGroup; }
+  std::int32_t patch_of_cell(std::int32_t c) const {
+    return patch_of[static_cast<std::size_t>(lane[c] / kGroup)];
+  }
+  /// The number of a shared vertex.
+  std::int32_t shared_number(std::int32_t packed_vertex) const {
+    return kGroup * (-2 - home[packed_vertex / kGroup]) + packed_vertex % kGroup;
+  }
+  /// The copies of a shared vertex.
+  std::span<const std::int32_t> copies(std::int32_t number) const {
+    return row_of(copies_begin, copies_of, copy_rows, number);
+  }
   std::size_t bytes() const;
 };
 
@@ -117,11 +174,25 @@ inline std::size_t scalar_of(std::int32_t packed) {
   return kTileScalars * (v / kGroup) + v % kGroup;
 }
 
-/// All but the weights between levels. `finer` is the level before, null for level 0.
+/// `finer` is the level before, null for level 0.
 PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
                           int threads);
 
-/// The weights from `fine` to the next level.
-void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine);
+/// What an update moved.
+struct PatchMoves {
+  struct Move {
+    std::int32_t from, to;
+  };
+  std::vector<Move> vertices;      ///< packed numbers
+  std::vector<Move> cells;         ///< lane (of a new cell: that of its origin), and the cell
+  std::vector<Range> groups;       ///< whose lanes are others now
+  std::vector<std::int32_t> held;  ///< cells that are new or have another HeldCell
+};
+
+/// Patches in which a cut changed something are made again; the others keep their numbers. `finer`
+/// has been updated, and moved as `below` says.
+PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,
+                          std::size_t index, const PatchedLevel* finer, const PatchMoves* below,
+                          int threads, PatchedLevel& level);
 
 }  // namespace kerf::cpu

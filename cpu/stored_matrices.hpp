@@ -73,7 +73,7 @@ class StoredMatrices {
       traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0)));
       std::size_t& size = is_coded ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
-      size += full ? kernels::kEntries : kernels::kModeEntries;
+      if (level.kind[g] != kNoCells) size += full ? kernels::kEntries : kernels::kModeEntries;
     }
     plain_.resize(kGroup * plain);
     codes_.resize(kGroup * codes);

@@ -230,6 +230,80 @@ TEST(FastBackend, CoarseMatricesOverThickSupportsAreThoseOfTheReference) {
   }
 }
 
+/// All operations that do not depend on what was done before, of every level, one after another.
+std::vector<Vector> results_of(const Problem& p, Backend& backend) {
+  std::vector<Vector> out;
+  backend.set_operator(kDynamic);
+  backend.prepare(0);
+  for (int l = 0; l < p.levels(); ++l) {
+    if (l > 0) backend.coarsen(l - 1), backend.prepare(l);
+    test::write(backend, l, kKrylovX, p.free_vector(l, 7));
+    backend.apply(l, kKrylovX, kKrylovV);
+    out.push_back(p.read(backend, l, kKrylovV));
+    backend.precondition_jacobi(l, kKrylovX, kKrylovV);
+    out.push_back(p.read(backend, l, kKrylovV));
+  }
+  for (int l = 0; l + 1 < p.levels(); ++l) {
+    test::write(backend, l, kResidual, p.free_vector(l, 8));
+    backend.restrict_residual(l);
+    out.push_back(p.read(backend, l + 1, kRight));
+    test::write(backend, l + 1, kSolution, p.free_vector(l + 1, 9));
+    test::write(backend, l, kSolution, p.free_vector(l, 10));
+    backend.prolong_correction(l);
+    out.push_back(p.read(backend, l, kSolution));
+  }
+  return out;
+}
+
+// Patches that a cut touched are made again, in place or elsewhere; vectors and rotations move.
+TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
+  constexpr double kDouble = 1e-12;
+  for (const int refinement : {0, 1, 2}) {
+    ProblemOptions options;
+    options.coarsest_vertices = 1;
+    options.max_levels = 3;
+    options.with_oracle = false;
+    const Voxels voxels = test::box_body({33, 18, 14});
+    Problem p(LinkedOctree(voxels, refinement), options);
+    const auto fast = test::make_backend("fast", 2), reference = test::make_backend("cpu");
+    const int held = fast->add_vector(), work = fast->add_vector();
+    reference->add_vector(), reference->add_vector();
+    fast->load(p.hierarchy);
+    LevelUpdater updater;
+    test::Dice dice(refinement + 1);
+    test::RandomBlades random(voxels.lattice, dice);
+    for (int i = 0; i < 5; ++i) {
+      SCOPED_TRACE(::testing::Message() << "refinement " << refinement << ", blade " << i);
+      const Vector before = test::random_vector(p.unknowns(0), 3);
+      test::write(*fast, 0, held, before);
+      test::write(*fast, 0, work, p.deformation());
+      fast->rotate_cells(work);
+      std::vector<double> rotation(4 * p.hierarchy.values.size());
+      fast->read_rotations(rotation);
+
+      ASSERT_TRUE(p.update(updater, cut(p.body, {}, random.next(), i + 1)));
+      const LevelChange& change = updater.change().levels[0];
+      fast->update(p.hierarchy, updater.change());
+
+      Vector kept = Vector::Zero(static_cast<Eigen::Index>(p.unknowns(0)));
+      kept.head(before.size()) = before;
+      ASSERT_EQ(p.read(*fast, 0, held), kept);
+      for (const std::int32_t origin : change.origin)
+        for (std::size_t k = 0; k < 4; ++k)
+          rotation.push_back(rotation[4 * static_cast<std::size_t>(origin) + k]);
+      std::vector<double> now(rotation.size());
+      fast->read_rotations(now);
+      ASSERT_EQ(now, rotation);
+      reference->load(p.hierarchy);
+      reference->write_rotations(rotation);
+      const std::vector<Vector> found = results_of(p, *fast), expected = results_of(p, *reference);
+      for (std::size_t n = 0; n < found.size(); ++n) {
+        ASSERT_LE(relative(found[n], expected[n]), kDouble * (n % 2 == 1 ? 100 : 1)) << n;
+      }
+    }
+  }
+}
+
 // A factor of slightly older rotations serves; one of another structure or operator does not.
 TEST(LinearSolver, KeepsTheFactorOfTheCoarsestLevelWhileItServes) {
   constexpr double kTolerance = 1e-9;

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
 //
 // The numbers of patches: that every cell and vertex is there once, that points mean what the level
-// says, and that groups and rows are what they are called.
+// says, and that groups and rows are what they are called; when they are made, and when cuts have
+// changed some of them.
 #include <gtest/gtest.h>
 
-#include <set>
 #include <utility>
 #include <vector>
 
-#include "cpu/patched_level.hpp"
+#include "tests/support/patch_checks.hpp"
 #include "tests/support/problem.hpp"
 
 namespace kerf {
 namespace {
 
 using cpu::kGroup;
-using cpu::Patch;
 using cpu::PatchedLevel;
+using cpu::PatchMoves;
+using test::patches_of;
 using test::Problem;
 using test::ProblemOptions;
 
@@ -30,117 +31,24 @@ Problem cut_octree(bool duplicate) {
   return {std::move(body), options};
 }
 
-std::vector<PatchedLevel> patches_of(const Hierarchy& hierarchy, int threads) {
-  std::vector<PatchedLevel> out;
-  for (std::size_t l = 0; l < hierarchy.levels.size(); ++l)
-    out.push_back(cpu::make_patches(hierarchy, l, l == 0 ? nullptr : &out[l - 1], threads));
-  for (std::size_t l = 1; l < out.size(); ++l) cpu::fill_weights(out[l], out[l - 1]);
-  return out;
-}
-
-/// Where the points of a patch are, three coordinates each: hanging ones by their masters.
-std::vector<Vec3d> places_of(const PatchedLevel& l, const Patch& patch) {
-  std::vector<Vec3d> out(static_cast<std::size_t>(patch.points));
-  const auto place = [&](std::int32_t packed) {
-    const Vec3i& p = l.level->point[l.vertex[packed]];
-    return Vec3d{double(p[0]), double(p[1]), double(p[2])};
-  };
-  for (std::int32_t v = patch.first_own; v < patch.first_own + patch.own; ++v)
-    if (l.vertex[v] >= 0) out[l.own_point[v]] = place(v);
-  for (std::int32_t k = patch.first_copy; k < patch.first_copy + patch.copies; ++k)
-    out[l.copy_point[k]] = place(l.copy_vertex[k]);
-  for (std::int32_t h = patch.first_hanging; h < patch.first_hanging + patch.hanging; ++h) {
-    Vec3d sum{};
-    for (const std::uint16_t m : l.hanging_masters[h]) sum += out[m];
-    out[l.hanging_point[h]] = 0.25 * sum;
-  }
-  return out;
-}
-
-TEST(Patches, HaveEveryCellAndVertexOnce) {
+TEST(Patches, AreWholeWhenMade) {
   const Problem p = cut_octree(true);
-  for (const PatchedLevel& l : patches_of(p.hierarchy, 1)) {
-    std::vector<int> cells(l.level->corner.size()), vertices(l.level->point.size());
-    for (const std::int32_t c : l.cell)
-      if (c >= 0) ++cells[c];
-    for (const std::int32_t v : l.vertex)
-      if (v >= 0) ++vertices[v];
-    EXPECT_EQ(cells, std::vector<int>(cells.size(), 1));
-    EXPECT_EQ(vertices, std::vector<int>(vertices.size(), 1));
-    for (std::size_t v = 0; v < vertices.size(); ++v) EXPECT_EQ(l.vertex[l.packed[v]], int(v));
-    for (std::size_t c = 0; c < cells.size(); ++c) EXPECT_EQ(l.cell[l.lane[c]], int(c));
-    EXPECT_EQ(l.vertices() % kGroup, 0u);
-  }
-}
-
-TEST(Patches, PutEveryCornerWhereItIs) {
-  const Problem p = cut_octree(true);
+  const std::vector<PatchedLevel> levels = patches_of(p.hierarchy, 1);
+  test::expect_whole(levels);
   int hanging = 0, rows = 0;
-  for (const PatchedLevel& l : patches_of(p.hierarchy, 1))
-    for (const Patch& patch : l.patches) {
-      const std::vector<Vec3d> place = places_of(l, patch);
-      hanging += patch.hanging;
-      for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g) {
-        rows += l.row[g] != cpu::kScattered;
-        for (int k = 0; k < kGroup; ++k) {
-          const std::int32_t c = l.cell[kGroup * g + k];
-          for (int i = 0; i < 8; ++i) {
-            const std::uint16_t point = l.corners[64 * std::size_t(g) + 8 * i + k];
-            if (c < 0) {
-              EXPECT_EQ(point, patch.points - 1);
-              continue;
-            }
-            for (int d = 0; d < 3; ++d)
-              EXPECT_EQ(place[point][d],
-                        l.level->corner[c][d] + (((i >> d) & 1) << l.level->size_log2[c]));
-          }
-        }
-      }
-    }
+  for (const PatchedLevel& l : levels) {
+    hanging += static_cast<int>(l.hanging_point.size());
+    for (const std::uint8_t row : l.row) rows += row != cpu::kScattered;
+  }
   EXPECT_GT(hanging, 100);
   EXPECT_GT(rows, 100);
+  EXPECT_GT(levels[0].patches.size(), 4u);
+  EXPECT_GT(levels[0].shared, 100);
 }
 
-// The points of a row follow each other; those of pairs of rows do in each half.
-TEST(Patches, CallRowsWhatRowsAre) {
-  const Problem p = cut_octree(true);
-  for (const PatchedLevel& l : patches_of(p.hierarchy, 1))
-    for (std::size_t g = 0; g < l.groups(); ++g) {
-      const std::uint16_t* corners = l.corners.data() + 64 * g;
-      if (l.row[g] == cpu::kScattered) continue;
-      for (int i = 0; i < 8; i += 2)
-        for (int k = 0; k < kGroup; ++k) {
-          EXPECT_EQ(corners[8 * (i + 1) + k], corners[8 * i + k] + 1);
-          const bool starts = k == 0 || (k == 4 && l.row[g] == cpu::kTwoRows);
-          if (!starts) {
-            EXPECT_EQ(corners[8 * i + k], corners[8 * i + k - 1] + 1);
-          }
-        }
-    }
-}
-
-TEST(Patches, SumSharedVerticesOverAllTheirCopies) {
-  const Problem p = cut_octree(true);
-  for (const PatchedLevel& l : patches_of(p.hierarchy, 1)) {
-    std::set<std::pair<std::int32_t, std::int32_t>> expected, found;  // vertex, patch
-    for (std::size_t n = 0; n < l.patches.size(); ++n) {
-      const Patch& patch = l.patches[n];
-      for (std::int32_t g = patch.first_group; g < patch.first_group + patch.groups; ++g)
-        for (int k = 0; k < kGroup; ++k)
-          if (const std::int32_t c = l.cell[kGroup * g + k]; c >= 0)
-            for (const std::int32_t v : l.level->slots[c])
-              if (l.packed[v] >= l.first_shared) expected.insert({l.packed[v], int(n)});
-    }
-    for (std::int32_t v = l.first_shared; v < int(l.vertices()); ++v)
-      for (std::int32_t i = l.copies_begin[v - l.first_shared];
-           i < l.copies_begin[v - l.first_shared + 1]; ++i) {
-        std::int32_t n = 0;
-        while (l.copies_of[i] >= l.patches[n].first_copy + l.patches[n].copies) ++n;
-        EXPECT_EQ(l.copy_vertex[l.copies_of[i]], v);
-        EXPECT_TRUE(found.insert({v, n}).second);
-      }
-    EXPECT_EQ(found, expected);
-  }
+TEST(Patches, AreWholeWithoutDuplicates) {
+  const Problem p = cut_octree(false);
+  test::expect_whole(patches_of(p.hierarchy, 1));
 }
 
 TEST(Patches, AreTheSameForAnyNumberOfThreads) {
@@ -152,29 +60,119 @@ TEST(Patches, AreTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one[l].corners, more[l].corners);
     EXPECT_EQ(one[l].vertex, more[l].vertex);
     EXPECT_EQ(one[l].hanging_masters, more[l].hanging_masters);
+    EXPECT_EQ(one[l].transfer.term_point, more[l].transfer.term_point);
   }
 }
 
-// Two children in one octant have no place of their own there.
-TEST(Patches, MergeOneChildAnOctantOrGoTheGeneralWay) {
-  for (const bool duplicate : {true, false}) {
-    const Problem p = cut_octree(duplicate);
-    const std::vector<PatchedLevel> all = patches_of(p.hierarchy, 1);
-    for (std::size_t l = 1; l < all.size(); ++l)
-      for (std::size_t lane = 0; lane < all[l].cell.size(); ++lane) {
-        const std::int32_t c = all[l].cell[lane];
-        if (c < 0 || all[l].kind[lane / kGroup] == cpu::kGeneral) continue;
-        std::size_t found = 0;
-        for (std::size_t o = 0; o < 8; ++o)
-          found += all[l].children[64 * (lane / kGroup) + kGroup * o + lane % kGroup] >= 0;
-        std::size_t expected = 0;
-        for (const std::int32_t child : all[l].level->children_of(c))
-          expected += all[l - 1].held[child] != cpu::kWhollyHeld;
-        EXPECT_EQ(found, expected);
-        EXPECT_EQ(all[l].held[c] == cpu::kPartlyHeld,
-                  all[l].kind[lane / kGroup] >= cpu::kHeldMerged);
-      }
+/// Patches that follow the cuts of a body, with a vector and lanes that they move.
+class Followed {
+ public:
+  explicit Followed(Problem& problem, int threads)
+      : problem_(problem), threads_(threads), levels_(patches_of(problem.hierarchy, threads)) {
+    for (const PatchedLevel& l : levels_) {
+      vectors_.emplace_back(l.vertices(), 0);
+      for (std::size_t v = 0; v < l.packed.size(); ++v) vectors_.back()[l.packed[v]] = int(v) + 1;
+    }
+    lanes_ = levels_[0].cell;
   }
+
+  void update(const HierarchyChange& change) {
+    PatchMoves moves;
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      const std::size_t before = levels_[l].groups_built;
+      moves = cpu::update_patches(problem_.hierarchy, change, l, l == 0 ? nullptr : &levels_[l - 1],
+                                  l == 0 ? nullptr : &moves, threads_, levels_[l]);
+      remade_ += levels_[l].groups_built != before;
+      move_vector(moves, levels_[l], change.levels[l].vertices_before, vectors_[l]);
+      if (l == 0) move_lanes(moves, change.levels[0]);
+    }
+  }
+
+  const std::vector<PatchedLevel>& levels() const { return levels_; }
+  int remade() const { return remade_; }
+
+ private:
+  static void move_vector(const PatchMoves& moves, const PatchedLevel& l, std::int32_t before,
+                          std::vector<int>& vector) {
+    std::vector<int> values;
+    for (const PatchMoves::Move& m : moves.vertices)
+      values.push_back(std::exchange(vector[m.from], 0));
+    vector.resize(l.vertices(), 0);
+    for (std::size_t n = 0; n < values.size(); ++n) vector[moves.vertices[n].to] = values[n];
+    for (std::size_t k = 0; k < vector.size(); ++k) {
+      const std::int32_t v = l.vertex[k];
+      ASSERT_EQ(vector[k], v < 0 || v >= before ? 0 : v + 1);
+      if (v >= 0) vector[k] = v + 1;
+    }
+  }
+
+  void move_lanes(const PatchMoves& moves, const LevelChange& change) {
+    const PatchedLevel& l = levels_[0];
+    std::vector<int> values;
+    for (const PatchMoves::Move& m : moves.cells) values.push_back(lanes_[m.from]);
+    lanes_.resize(l.cell.size(), -1);
+    for (const cpu::Range& groups : moves.groups)
+      std::fill(lanes_.begin() + kGroup * groups.first, lanes_.begin() + kGroup * groups.end(), -1);
+    for (std::size_t n = 0; n < values.size(); ++n) lanes_[l.lane[moves.cells[n].to]] = values[n];
+    for (std::size_t k = 0; k < lanes_.size(); ++k) {
+      const std::int32_t c = l.cell[k], old = change.cells_before;
+      ASSERT_EQ(lanes_[k], c < old ? c : change.origin[c - old]);
+      lanes_[k] = c;
+    }
+  }
+
+  Problem& problem_;
+  int threads_;
+  std::vector<PatchedLevel> levels_;
+  std::vector<std::vector<int>> vectors_;  // per level: vertex + 1 where there is one
+  std::vector<std::int32_t> lanes_;        // the cell of each lane
+  int remade_ = 0;
+};
+
+struct Counts {
+  int updates = 0, remade = 0, untouched = 0;
+};
+
+void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& counts) {
+  test::Dice dice(seed);
+  const Voxels voxels = test::box_body({34 + dice.roll(8), 20, 18});
+  ProblemOptions options;
+  options.coarsest_vertices = 1;
+  options.max_levels = 3;
+  options.with_oracle = false;
+  Problem p(LinkedOctree(voxels, refinement), options);
+  test::RandomBlades random(voxels.lattice, dice);
+  LevelUpdater updater;
+  Followed one(p, 1), two(p, 2);
+  for (int i = 0; i < blades; ++i) {
+    SCOPED_TRACE(::testing::Message() << "seed " << seed << ", blade " << i);
+    const CutEvent event = cut(p.body, {}, random.next(), i + 1);
+    ASSERT_TRUE(p.update(updater, event));
+    const std::vector<std::int32_t> lanes = one.levels()[0].lane;
+    one.update(updater.change());
+    two.update(updater.change());
+    test::expect_whole(one.levels());
+    if (::testing::Test::HasFailure()) return;
+    for (std::size_t l = 0; l < one.levels().size(); ++l) {
+      ASSERT_EQ(one.levels()[l].cell, two.levels()[l].cell);
+      ASSERT_EQ(one.levels()[l].vertex, two.levels()[l].vertex);
+      ASSERT_EQ(one.levels()[l].copies_of, two.levels()[l].copies_of);
+      ASSERT_EQ(one.levels()[l].transfer.givers, two.levels()[l].transfer.givers);
+    }
+    ++counts.updates;
+    for (std::size_t c = 0; c < lanes.size(); ++c)
+      counts.untouched += lanes[c] == one.levels()[0].lane[c];
+  }
+  counts.remade += one.remade();
+}
+
+TEST(Patches, StayWholeUnderCuts) {
+  Counts counts;
+  for (const std::uint64_t seed : {1, 2, 3, 4})
+    cut_and_follow(seed, static_cast<int>(seed % 3), 10, counts);
+  EXPECT_EQ(counts.updates, 40);
+  EXPECT_GT(counts.remade, 0);
+  EXPECT_GT(counts.untouched, 1000);
 }
 
 }  // namespace

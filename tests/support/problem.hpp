@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/backend.hpp"
+#include "core/levels/update.hpp"
 #include "cpu/cpu_backend.hpp"
 #include "cpu/fast_backend.hpp"
 #include "tests/oracle/system_oracle.hpp"
@@ -37,6 +38,7 @@ struct ProblemOptions {
   Holds holds = Holds::mixed;
   bool lumped_mass = false;
   int coarsest_vertices = 30;
+  int max_levels = 0;
   bool duplicate_cells = true;
   int materials = 3;
   bool with_oracle = true;  ///< false: no grids, for bodies too large for brute force
@@ -84,11 +86,33 @@ struct Problem {
       hierarchy.values.push_back({m.young * side, m.density * side * side * side, index});
     }
     hold(finest);
-    build_coarse_levels(hierarchy, {given.coarsest_vertices, 0, given.duplicate_cells});
+    build_coarse_levels(hierarchy,
+                        {given.coarsest_vertices, given.max_levels, given.duplicate_cells});
     if (given.with_oracle) grids = oracle::grids_like(body, hierarchy, given.duplicate_cells);
   }
   explicit Problem(const std::string& name, const ProblemOptions& given = {})
       : Problem(scene(name), given) {}
+
+  /// Brings the hierarchy, not the grids, up to date after a cut of the body; what is new is held
+  /// as its place says. Returns false if it would have another number of levels.
+  bool update(LevelUpdater& updater, const CutEvent& event) {
+    updater.update_finest(body, event, hierarchy);
+    const LevelChange& change = updater.change().levels[0];
+    Level& finest = hierarchy.levels[0];
+    const auto value_of = [&](std::int32_t origin, std::int32_t cell) {
+      const auto& m = physics.materials[hierarchy.values[origin].material];
+      const double side = physics.spacing * (1 << finest.size_log2[cell]);
+      return CellValues{m.young * side, m.density * side * side * side,
+                        hierarchy.values[origin].material};
+    };
+    for (std::int32_t c = change.cells_before; c < finest.cells(); ++c)
+      hierarchy.values.push_back(value_of(change.origin[c - change.cells_before], c));
+    for (const std::int32_t c : change.cells) hierarchy.values[c] = value_of(c, c);
+    for (std::int32_t v = change.vertices_before; v < finest.vertices(); ++v)
+      finest.fixed[v] = options.holds != Holds::none && finest.point[v][0] == 0 ? 7 : 0;
+    return updater.update_coarse(
+        hierarchy, {options.coarsest_vertices, options.max_levels, options.duplicate_cells});
+  }
 
   int levels() const { return static_cast<int>(hierarchy.levels.size()); }
   const Level& level(int l) const { return hierarchy.levels[l]; }

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+#include "cpu/patch_draft.hpp"
+
+#include <algorithm>
+
+#include "core/base/error.hpp"
+#include "kernels/transfer.hpp"
+
+namespace kerf::cpu {
+namespace {
+
+using Corners = Numbering::Corners;
+constexpr std::size_t kMostPoints = 0xFFFF;
+
+std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
+
+/// Bits of x with two zeros after each.
+std::uint64_t spread(std::uint64_t x) {
+  x &= 0x1FFFFF;
+  x = (x | x << 32) & 0x1F00000000FFFF;
+  x = (x | x << 16) & 0x1F0000FF0000FF;
+  x = (x | x << 8) & 0x100F00F00F00F00F;
+  x = (x | x << 4) & 0x10C30C30C30C30C3;
+  x = (x | x << 2) & 0x1249249249249249;
+  return x;
+}
+
+/// Orders points by z, then y, then x, so that rows of cells have rows of points.
+std::uint64_t place_key(const Vec3i& p) {
+  const auto at = [&](std::size_t d) { return static_cast<std::uint64_t>(p[d]) & 0x1FFFFF; };
+  return at(2) << 42 | at(1) << 21 | at(0);
+}
+
+/// The points that a hanging corner is the mean of.
+std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int corner) {
+  std::array<std::uint16_t, 4> out{};
+  std::size_t n = 0;
+  for (int j = 0; j < 8; ++j)
+    if (kernels::is_between(octant, corner, j)) out[n++] = slots[static_cast<std::size_t>(j)];
+  if (n == 2) out[2] = out[0], out[3] = out[1];
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// Cells of a patch in groups. Of each kind those first that make rows of eight, then pairs of rows
+/// of four, then the others by fold.
+class Grouping {
+ public:
+  Grouping(const Level& level, Draft& draft, Numbering& numbering)
+      : level_(level), draft_(draft), cells_(draft.cells) {
+    sort_cells();
+    draft.cells = cells_;
+    numbering.number(draft, corners_, slots_);
+    nothing_ = draft.nothing();
+    draft.cells.clear();
+    draft.cells.reserve(cells_.size() + cells_.size() / 4);
+    draft.corners.reserve(8 * draft.cells.capacity());
+    for (std::size_t begin = 0; begin < cells_.size();) {
+      std::size_t end = begin + 1;
+      while (end < cells_.size() && kind_of_[end] == kind_of_[begin]) ++end;
+      group_kind(begin, end, kind_of_[begin]);
+      begin = end;
+    }
+    put_slots();
+  }
+
+ private:
+  /// By kind, then by place.
+  void sort_cells() {
+    std::vector<std::tuple<std::uint16_t, std::uint64_t, std::int32_t>> order(cells_.size());
+    for (std::size_t n = 0; n < cells_.size(); ++n)
+      order[n] = {draft_.kind_of[n], place_key(level_.corner[cells_[n]]), cells_[n]};
+    std::sort(order.begin(), order.end());
+    kind_of_.resize(order.size());
+    for (std::size_t n = 0; n < order.size(); ++n) {
+      kind_of_[n] = std::get<0>(order[n]);
+      cells_[n] = std::get<2>(order[n]);
+    }
+  }
+
+  /// Whether the points of the next cell continue those of cell n along x.
+  bool continues(std::size_t n) const {
+    const Corners &a = corners_[n], &b = corners_[n + 1];
+    for (std::size_t i = 0; i < 8; i += 2)
+      if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
+    return true;
+  }
+
+  void group_kind(std::size_t begin, std::size_t end, std::uint16_t kind) {
+    std::vector<std::size_t> halves, rest;
+    for (std::size_t i = begin; i < end;) {
+      std::size_t run = 1;
+      while (run < kGroup && i + run < end && continues(i + run - 1)) ++run;
+      if (run == kGroup)
+        for (std::size_t k = 0; k < run; ++k) put(i + k, kind, kRow);
+      else
+        for (std::size_t k = 0; k < run; ++k) (k < run / 4 * 4 ? halves : rest).push_back(i + k);
+      i += run;
+    }
+    if (halves.size() % kGroup != 0) {
+      rest.insert(rest.end(), halves.end() - 4, halves.end());
+      halves.erase(halves.end() - 4, halves.end());
+    }
+    for (const std::size_t n : halves) put(n, kind, kTwoRows);
+    const auto fold = [&](std::size_t n) { return level_.fold[cells_[n]]; };
+    std::stable_sort(rest.begin(), rest.end(),
+                     [&](std::size_t a, std::size_t b) { return fold(a) < fold(b); });
+    for (const std::size_t n : rest) put(n, kind, kScattered);
+    while (draft_.cells.size() % kGroup != 0) draft_.cells.push_back(-1);
+    index_.resize(draft_.cells.size());
+  }
+
+  void put(std::size_t n, std::uint16_t kind, RowKind row) {
+    const std::size_t k = draft_.cells.size() % kGroup, group = draft_.cells.size() / kGroup;
+    if (k == 0) {
+      draft_.kind.push_back(kind);
+      draft_.row.push_back(row);
+      draft_.folded.push_back(0);
+      draft_.corners.resize(draft_.corners.size() + 8 * kGroup, nothing_);
+    }
+    draft_.cells.push_back(cells_[n]);
+    index_.push_back(n);
+    for (std::size_t i = 0; i < 8; ++i)
+      draft_.corners[8 * kGroup * group + kGroup * i + k] = corners_[n][i];
+    if (!kernels::has_hanging(level_.fold[cells_[n]])) return;
+    draft_.folded[group] = 1;
+  }
+
+  /// Slots of the groups in which some corner hangs.
+  void put_slots() {
+    for (std::size_t g = 0; g < draft_.folded.size(); ++g) {
+      if (draft_.folded[g] == 0) continue;
+      const std::size_t at = draft_.slots.size();
+      draft_.slots.resize(at + 8 * kGroup, nothing_);
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        const std::int32_t c = draft_.cells[kGroup * g + k];
+        if (c < 0) continue;
+        const Corners& from = slots_[index_[kGroup * g + k]];
+        for (std::size_t i = 0; i < 8; ++i) draft_.slots[at + kGroup * i + k] = from[i];
+      }
+    }
+  }
+
+  const Level& level_;
+  Draft& draft_;
+  std::vector<std::int32_t> cells_;  // in the order of corners_ and slots_
+  std::vector<std::uint16_t> kind_of_;
+  std::vector<Corners> corners_, slots_;
+  std::vector<std::size_t> index_;  // per lane, into these
+  std::uint16_t nothing_ = 0;
+};
+
+}  // namespace
+
+std::uint64_t morton(const Vec3i& c) {
+  const auto at = [&](std::size_t d) { return spread(static_cast<std::uint64_t>(c[d])); };
+  return at(0) | at(1) << 1 | at(2) << 2;
+}
+
+void Numbering::number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots) {
+  places_.clear();
+  hanging_.clear();
+  corners.reserve(draft.cells.size());
+  slots.reserve(draft.cells.size());
+  for (const std::int32_t c : draft.cells) {
+    slots.emplace_back();
+    for (std::size_t i = 0; i < 8; ++i) slots.back()[i] = vertex(level_.slots[c][i], draft);
+  }
+  const std::size_t vertices = draft.vertices.size();
+  for (std::size_t n = 0; n < draft.cells.size(); ++n)
+    corners.push_back(corners_of(draft, n, slots[n]));
+  for (const std::int32_t v : draft.vertices) first_[v] = 0;
+  sort(draft, vertices);
+  for (auto* all : {&corners, &slots})
+    for (Corners& of : *all)
+      for (std::uint16_t& point : of) point = rank_[point];
+}
+
+std::uint16_t Numbering::vertex(std::int32_t v, Draft& draft) {
+  std::int32_t& first = first_[v];
+  if (first == 0) {
+    draft.vertices.push_back(v);
+    places_.push_back(place_key(level_.point[v]));
+    first = size_of(draft.vertices.size());
+    ensures(places_.size() < kMostPoints, "a patch has too many points");
+  }
+  return static_cast<std::uint16_t>(first - 1);
+}
+
+Corners Numbering::corners_of(Draft& draft, std::size_t n, const Corners& slots) {
+  const std::int32_t cell = draft.cells[n];
+  const kernels::FoldCode fold = level_.fold[cell];
+  Corners out = slots;
+  if (!kernels::has_hanging(fold)) return out;
+  for (int i = 0; i < 8; ++i) {
+    if (!kernels::is_hanging(fold, i)) continue;
+    const auto masters = masters_of(slots, kernels::fold_octant(fold), i);
+    const std::uint64_t key = std::uint64_t{masters[0]} | std::uint64_t{masters[1]} << 16 |
+                              std::uint64_t{masters[2]} << 32 | std::uint64_t{masters[3]} << 48;
+    const auto [entry, added] = hanging_.try_emplace(key, size_of(places_.size()));
+    if (added) {
+      Vec3i p = level_.corner[cell];
+      for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) << level_.size_log2[cell];
+      places_.push_back(place_key(p));
+      draft.masters.push_back(masters);
+      ensures(places_.size() < kMostPoints, "a patch has too many points");
+    }
+    out[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(entry->second);
+  }
+  return out;
+}
+
+/// From the order in which points were met to that of their places; hanging ones come last of those
+/// of one place.
+void Numbering::sort(Draft& draft, std::size_t vertices) {
+  order_.resize(places_.size());
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const std::int32_t v = k < vertices ? draft.vertices[k] : INT32_MAX;
+    order_[k] = {places_[k], static_cast<std::uint64_t>(v) << 16 | k};
+  }
+  std::sort(order_.begin(), order_.end());
+  rank_.resize(places_.size());
+  std::vector<std::int32_t> sorted;
+  sorted.reserve(vertices);
+  draft.vertex_point.reserve(vertices);
+  draft.hanging_point.resize(draft.masters.size());
+  for (std::size_t rank = 0; rank < order_.size(); ++rank) {
+    const std::size_t k = order_[rank].second & 0xFFFF;
+    rank_[k] = static_cast<std::uint16_t>(rank);
+    if (k < vertices) {
+      sorted.push_back(draft.vertices[k]);
+      draft.vertex_point.push_back(rank_[k]);
+    } else {
+      draft.hanging_point[k - vertices] = rank_[k];
+    }
+  }
+  draft.vertices = std::move(sorted);
+  for (auto& masters : draft.masters)
+    for (std::uint16_t& m : masters) m = rank_[m];
+}
+
+void make_draft(const Level& level, Draft& draft, Numbering& numbering) {
+  Grouping(level, draft, numbering);
+}
+
+}  // namespace kerf::cpu

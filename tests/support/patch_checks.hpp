@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: MIT
+//
+// What must hold of patches, however they came about.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "cpu/patched_level.hpp"
+#include "kernels/transfer.hpp"
+
+namespace kerf::test {
+
+using cpu::kGroup;
+using cpu::Patch;
+using cpu::PatchedLevel;
+
+inline std::vector<PatchedLevel> patches_of(const Hierarchy& hierarchy, int threads) {
+  std::vector<PatchedLevel> out;
+  for (std::size_t l = 0; l < hierarchy.levels.size(); ++l)
+    out.push_back(cpu::make_patches(hierarchy, l, l == 0 ? nullptr : &out[l - 1], threads));
+  return out;
+}
+
+/// body(patch, group) for all groups with cells.
+template <class Body>
+void for_groups(const PatchedLevel& l, const Body& body) {
+  for (std::size_t p = 0; p < l.patches.size(); ++p)
+    for (std::int32_t g = l.patches[p].groups.first; g < l.patches[p].groups.end(); ++g)
+      body(static_cast<std::int32_t>(p), static_cast<std::size_t>(g));
+}
+
+inline void expect_all_once(const PatchedLevel& l) {
+  std::vector<int> cells(l.level->corner.size()), vertices(l.level->point.size());
+  for_groups(l, [&](std::int32_t p, std::size_t g) {
+    EXPECT_EQ(l.patch_of[g], p);
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const std::int32_t c = l.cell[kGroup * g + k];
+      if (c < 0) continue;
+      ++cells[c];
+      EXPECT_EQ(l.lane[c], int(kGroup * g + k));
+    }
+  });
+  EXPECT_EQ(cells, std::vector<int>(cells.size(), 1));
+  int shared = 0, others = 0;
+  for (std::size_t k = 0; k < l.vertex.size(); ++k) {
+    const std::int32_t v = l.vertex[k];
+    EXPECT_EQ(l.fixed[k], v < 0 ? 0 : l.level->fixed[v]);
+    if (v < 0) continue;
+    ++vertices[v];
+    EXPECT_EQ(l.packed[v], int(k));
+    const std::int32_t home = l.home[k / kGroup];
+    EXPECT_NE(home, PatchedLevel::kNowhere);
+    ++(PatchedLevel::is_shared(home) ? shared : others);
+    if (PatchedLevel::is_shared(home)) {
+      EXPECT_LT(l.shared_number(int(k)), l.shared);
+    }
+  }
+  EXPECT_EQ(shared, l.shared);
+  EXPECT_EQ(vertices, std::vector<int>(vertices.size(), 1));
+  EXPECT_EQ(l.vertices() % kGroup, 0u);
+  EXPECT_EQ(l.groups() * kGroup, l.cell.size());
+}
+
+/// Where the points of a patch are, three coordinates each: hanging ones by their masters.
+inline std::vector<Vec3d> places_of(const PatchedLevel& l, const Patch& patch) {
+  std::vector<Vec3d> out(static_cast<std::size_t>(patch.points));
+  const auto place = [&](std::int32_t packed) {
+    const Vec3i& p = l.level->point[l.vertex[packed]];
+    return Vec3d{double(p[0]), double(p[1]), double(p[2])};
+  };
+  for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v)
+    if (l.vertex[v] >= 0)
+      out[l.own_point[v]] = place(v);
+    else
+      EXPECT_EQ(l.own_point[v], patch.points - 1);
+  for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
+    out[l.copy_point[k]] = place(l.copy_vertex[k]);
+  for (std::int32_t h = patch.hanging.first; h < patch.hanging.end(); ++h) {
+    Vec3d sum{};
+    for (const std::uint16_t m : l.hanging_masters[h]) sum += out[m];
+    out[l.hanging_point[h]] = 0.25 * sum;
+  }
+  return out;
+}
+
+inline void expect_corners_in_place(const PatchedLevel& l) {
+  std::vector<std::vector<Vec3d>> places;
+  for (const Patch& patch : l.patches) places.push_back(places_of(l, patch));
+  for_groups(l, [&](std::int32_t p, std::size_t g) {
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const std::int32_t c = l.cell[kGroup * g + k];
+      for (std::size_t i = 0; i < 8; ++i) {
+        const std::uint16_t point = l.corners[64 * g + 8 * i + k];
+        if (c < 0) {
+          EXPECT_EQ(point, l.patches[p].points - 1);
+          continue;
+        }
+        for (int d = 0; d < 3; ++d)
+          ASSERT_EQ(places[p][point][d],
+                    l.level->corner[c][d] + (((int(i) >> d) & 1) << l.level->size_log2[c]));
+      }
+    }
+  });
+}
+
+/// The vertex that a point of a patch is, by point; -1: none.
+inline std::vector<std::int32_t> vertices_of(const PatchedLevel& l, const Patch& patch) {
+  std::vector<std::int32_t> out(static_cast<std::size_t>(patch.points), -1);
+  for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v)
+    if (l.vertex[v] >= 0) out[l.own_point[v]] = l.vertex[v];
+  for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
+    out[l.copy_point[k]] = l.vertex[l.copy_vertex[k]];
+  return out;
+}
+
+/// Slots are the very vertices of the level: of two at one place the right one.
+inline void expect_slots(const PatchedLevel& l) {
+  std::vector<std::vector<std::int32_t>> vertices;
+  for (const Patch& patch : l.patches) vertices.push_back(vertices_of(l, patch));
+  for_groups(l, [&](std::int32_t p, std::size_t g) {
+    const std::uint16_t* at =
+        l.folded(g) ? l.slots.data() + 64 * std::size_t(l.slots_at[g]) : l.corners.data() + 64 * g;
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const std::int32_t c = l.cell[kGroup * g + k];
+      if (c < 0) continue;
+      for (std::size_t i = 0; i < 8; ++i)
+        ASSERT_EQ(vertices[p][at[8 * i + k]], l.level->slots[c][i]);
+    }
+  });
+}
+
+/// The points of a row follow each other; those of pairs of rows do in each half.
+inline void expect_rows(const PatchedLevel& l) {
+  for_groups(l, [&](std::int32_t, std::size_t g) {
+    const std::uint16_t* corners = l.corners.data() + 64 * g;
+    if (l.row[g] == cpu::kScattered) return;
+    for (int i = 0; i < 8; i += 2)
+      for (int k = 0; k < kGroup; ++k) {
+        EXPECT_EQ(corners[8 * (i + 1) + k], corners[8 * i + k] + 1);
+        const bool starts = k == 0 || (k == 4 && l.row[g] == cpu::kTwoRows);
+        if (!starts) {
+          EXPECT_EQ(corners[8 * i + k], corners[8 * i + k - 1] + 1);
+        }
+      }
+  });
+}
+
+/// Shared vertices have one copy in each patch that has a cell of them.
+inline void expect_copies(const PatchedLevel& l) {
+  std::set<std::pair<std::int32_t, std::int32_t>> expected, found;  // vertex, patch
+  std::map<std::int32_t, std::int32_t> patch_of_copy;
+  for (std::size_t n = 0; n < l.patches.size(); ++n)
+    for (std::int32_t k = l.patches[n].copies.first; k < l.patches[n].copies.end(); ++k)
+      patch_of_copy[k] = int(n);
+  for_groups(l, [&](std::int32_t p, std::size_t g) {
+    for (std::size_t k = 0; k < kGroup; ++k)
+      if (const std::int32_t c = l.cell[kGroup * g + k]; c >= 0)
+        for (const std::int32_t v : l.level->slots[c]) {
+          const std::int32_t home = l.home[l.packed[v] / kGroup];
+          if (PatchedLevel::is_shared(home))
+            expected.insert({l.packed[v], p});
+          else
+            EXPECT_EQ(home, p);
+        }
+  });
+  for (std::int32_t n = 0; n < l.shared; ++n)
+    for (const std::int32_t k : l.copies(n)) {
+      ASSERT_EQ(l.shared_number(l.copy_vertex[k]), n);
+      ASSERT_TRUE(patch_of_copy.count(k) != 0);
+      EXPECT_TRUE(found.insert({l.copy_vertex[k], patch_of_copy[k]}).second);
+    }
+  EXPECT_EQ(found, expected);
+}
+
+/// Two children in one octant have no place of their own there.
+inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
+  for (std::int32_t c = 0; c < l.level->cells(); ++c) {
+    const auto lane = static_cast<std::size_t>(l.lane[c]);
+    bool partly = false, wholly = true;
+    std::set<std::int32_t> expected, found;
+    for (const std::int32_t child : l.level->children_of(c)) {
+      partly = partly || finer.held[child] == cpu::kPartlyHeld;
+      wholly = wholly && finer.held[child] == cpu::kWhollyHeld;
+      if (finer.held[child] != cpu::kWhollyHeld) expected.insert(finer.lane[child]);
+    }
+    ASSERT_EQ(l.held[c], wholly ? cpu::kWhollyHeld : partly ? cpu::kPartlyHeld : cpu::kFree);
+    const std::uint16_t kind = l.kind[lane / kGroup];
+    EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || kind == cpu::kGeneral, kind >= cpu::kHeldMerged);
+    if (kind == cpu::kGeneral) continue;
+    for (std::size_t o = 0; o < 8; ++o)
+      if (const std::int32_t at = l.children[64 * (lane / kGroup) + kGroup * o + lane % kGroup];
+          at >= 0)
+        found.insert(at);
+    ASSERT_EQ(found, expected);
+  }
+}
+
+/// Rows of the transfer, as kernels/ give the weights to each cell of a vertex.
+inline void expect_transfer(const PatchedLevel& l, const Level& next) {
+  using Row = std::map<std::int32_t, float>;  // vertex of the next level, weight
+  const cpu::Transfer& t = l.transfer;
+  std::vector<Row> rows(l.level->point.size()), given(rows);
+  std::vector<int> count(rows.size());
+  std::set<std::pair<std::int32_t, std::int32_t>> expected, found;  // vertex of the next, point
+  const auto read = [&](const cpu::TransferPart& part, std::int32_t vertex, std::size_t& term,
+                        int terms) {
+    ++count[vertex];
+    for (; terms > 0; --terms, ++term) {
+      ASSERT_LT(t.term_point[term], part.points.size);
+      rows[vertex][t.point[part.points.first + t.term_point[term]]] +=
+          static_cast<float>(t.term_weight[term]) / 64;
+    }
+  };
+  for (std::size_t p = 0; p < l.patches.size(); ++p) {
+    const cpu::TransferPart& part = t.parts[p];
+    const cpu::Range& own = l.patches[p].own;
+    for (std::int32_t k = part.points.first; k < part.points.end(); ++k)
+      expected.insert({t.point[k], k});
+    for (std::int32_t first = own.first; first < own.end(); first += kGroup) {
+      std::size_t term = static_cast<std::size_t>(t.first_term[first / kGroup]);
+      for (std::int32_t v = first; v < first + kGroup; ++v)
+        if (l.vertex[v] >= 0)
+          read(part, l.vertex[v], term, t.terms[v]);
+        else
+          EXPECT_EQ(t.terms[v], 0);
+    }
+    std::size_t term = static_cast<std::size_t>(part.first_lead_term);
+    for (std::int32_t n = part.leads.first; n < part.leads.end(); ++n)
+      read(part, l.vertex[t.lead[n]], term, t.lead_terms[n]);
+    term = static_cast<std::size_t>(part.terms.first);
+    for (std::int32_t k = part.points.first; k < part.points.end(); ++k)
+      for (int n = 0; n < t.point_terms[k]; ++n, ++term) {
+        const std::int32_t row = t.given_row[term];
+        const std::int32_t packed =
+            row < own.size ? own.first + row : t.lead[part.leads.first + row - own.size];
+        given[l.vertex[packed]][t.point[k]] += static_cast<float>(t.given_weight[term]) / 64;
+      }
+  }
+  EXPECT_EQ(given, rows);
+  EXPECT_EQ(count, std::vector<int>(count.size(), 1));
+  for (std::int32_t v = 0; v < next.vertices(); ++v)
+    for (const std::int32_t k : t.givers_of(v)) found.insert({v, k});
+  EXPECT_EQ(found, expected);
+  for (std::int32_t c = 0; c < l.level->cells(); ++c) {
+    const std::int32_t parent = l.level->parent[c];
+    float w[8][8];
+    kernels::transfer_weights(l.level->fold[c], l.level->place[c], next.fold[parent], w);
+    for (std::size_t i = 0; i < 8; ++i) {
+      Row row;
+      for (std::size_t m = 0; m < 8; ++m)
+        if (w[i][m] != 0) row[next.slots[parent][m]] += w[i][m];
+      ASSERT_EQ(rows[l.level->slots[c][i]], row);
+    }
+  }
+}
+
+inline void expect_whole(const std::vector<PatchedLevel>& levels) {
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    SCOPED_TRACE(::testing::Message() << "level " << l);
+    expect_all_once(levels[l]);
+    expect_corners_in_place(levels[l]);
+    expect_slots(levels[l]);
+    expect_rows(levels[l]);
+    expect_copies(levels[l]);
+    if (l > 0) expect_children(levels[l - 1], levels[l]);
+    if (l + 1 < levels.size()) expect_transfer(levels[l], *levels[l + 1].level);
+  }
+}
+
+}  // namespace kerf::test
