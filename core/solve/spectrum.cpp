@@ -47,8 +47,8 @@ double largest_eigenvalue(const std::vector<double>& diagonal, const std::vector
 }  // namespace
 
 double estimate_spectral_bound(Backend& backend, int level, const Level& structure) {
-  constexpr int kSteps = 12;
-  // Twelve steps find the largest eigenvalue to some per cent from below. Chebyshev of degree 2 on
+  constexpr int kSteps = 8;
+  // Eight steps find the largest eigenvalue to some per cent from below. Chebyshev of degree 2 on
   // [l/8, l] still damps at 1.13 l, so that a margin of a tenth is on the safe side twice.
   constexpr double kMargin = 1.1;
   const int r = kResidual, p = kDirection, q = kScratch, z = kKrylovX;
