@@ -135,6 +135,7 @@ std::string to_json(const Summary& s) {
   json["bytes_per_cell"] =
       s.cells > 0 ? static_cast<double>(s.bytes) / static_cast<double>(s.cells) : 0.0;
   json["backend"] = s.backend;
+  json["instruction_set"] = s.instruction_set;
   json["threads"] = s.threads;
   json["precision"] = s.precision;
   json["version"] = kVersion;

@@ -28,7 +28,7 @@ struct Summary {
   std::vector<StepReport> steps;
   std::size_t peak_bytes = 0;  ///< of the process
   std::size_t bytes = 0;       ///< held by body, hierarchy and backend
-  std::string backend, precision;
+  std::string backend, instruction_set, precision;
   int threads = 0;
   std::uint64_t state_hash = 0;
   bool converged = true, interrupted = false;

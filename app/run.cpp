@@ -187,6 +187,7 @@ class Run {
     summary_.peak_bytes = peak_bytes();
     summary_.bytes = s.bytes();
     summary_.backend = s.backend().name();
+    summary_.instruction_set = s.backend().instruction_set();
     summary_.threads = s.backend().threads();
     summary_.precision = precision_name(scene_.setup.solver.precision);
     summary_.state_hash = s.state_hash();

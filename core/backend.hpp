@@ -54,6 +54,8 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual const char* name() const noexcept = 0;  ///< "cpu" or "cuda"
+  /// Of the processor, that the loops are compiled for: "baseline", "avx2", ...; empty: on a device.
+  virtual const char* instruction_set() const noexcept { return ""; }
   virtual int threads() const noexcept = 0;
   virtual std::size_t bytes() const = 0;
 

@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/solve/sparse_cholesky.hpp"
 #include "core/solve/spectrum.hpp"
+#include "cpu/instruction_set.hpp"
 #include "cpu/level_store.hpp"
 #include "cpu/near_loops.hpp"
 #include "cpu/surface_loops.hpp"
@@ -43,6 +44,7 @@ class CpuBackend final : public Backend {
   }
 
   const char* name() const noexcept override { return "reference"; }
+  const char* instruction_set() const noexcept override { return kInstructionSet; }
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;

@@ -16,6 +16,7 @@
 #include "core/base/error.hpp"
 #include "core/solve/sparse_cholesky.hpp"
 #include "cpu/fast_kernels.hpp"
+#include "cpu/instruction_set.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/transfer_points.hpp"
 
@@ -90,6 +91,7 @@ class FastBackend final : public Backend {
   FastBackend(int threads, bool updates);  ///< threads 0: all that OpenMP offers
 
   const char* name() const noexcept override { return "cpu"; }
+  const char* instruction_set() const noexcept override { return kInstructionSet; }
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;

@@ -118,7 +118,7 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
        {"scene",     "cells",   "cells_before_cuts", "vertices", "unknowns",   "hanging",
         "levels",    "pieces",  "seconds",           "steps",    "peak_bytes", "bytes_per_cell",
         "backend",   "threads", "precision",         "version",  "commit",     "state_hash",
-        "links_cut", "warnings"})
+        "links_cut", "warnings", "instruction_set"})
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_EQ(json["state_hash"], "0000000000000abc");
   EXPECT_EQ(json["levels"], 2);
