@@ -43,7 +43,11 @@ std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
 std::vector<std::pair<std::string, std::string>> backend_states() {
   const auto cpu = make_cpu_backend({});
   const char* threads = cpu->threads() == 1 ? " thread" : " threads";
-  return {{"cpu", text("ready, ", cpu->threads(), threads, ", double and mixed precision")},
+  std::string sets = make_fast_backend()->instruction_set();
+  const auto all = fast_instruction_sets();
+  for (std::size_t i = 0; i < all.size() && all.size() > 1; ++i)
+    sets += (i == 0 ? "; KERF_INSTRUCTION_SET may be " : ", ") + all[i];
+  return {{"cpu", text("ready, ", cpu->threads(), threads, ", double and mixed precision, ", sets)},
           {"reference", text("ready, ", cpu->threads(), threads, ", double precision")},
           {"cuda", "not in this version"}};
 }

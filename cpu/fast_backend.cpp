@@ -2,8 +2,6 @@
 //
 // Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time, and
 // what follows a sum (residual, step of Chebyshev) is done while it is in registers.
-#include "cpu/fast_backend.hpp"
-
 #include <omp.h>
 
 #include <algorithm>
@@ -13,8 +11,7 @@
 #include "core/solve/spectrum.hpp"
 #include "cpu/fast_state.hpp"
 
-namespace kerf {
-namespace cpu {
+namespace kerf::cpu {
 
 template <class S>
 FastBackend<S>::FastBackend(int threads, bool updates)
@@ -482,12 +479,4 @@ void FastBackend<S>::factor_coarsest() {
 template class FastBackend<float>;
 template class FastBackend<double>;
 
-}  // namespace cpu
-
-std::unique_ptr<Backend> make_fast_backend(const FastOptions& options) {
-  if (options.single_cycle)
-    return std::make_unique<cpu::FastBackend<float>>(options.threads, options.updates);
-  return std::make_unique<cpu::FastBackend<double>>(options.threads, options.updates);
-}
-
-}  // namespace kerf
+}  // namespace kerf::cpu

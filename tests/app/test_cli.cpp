@@ -184,6 +184,19 @@ TEST_F(KerfCommand, RefusesABackendThatIsNotThere) {
   expect_refused(run_scene(kBlock, "--set solver.backend=cuda"), 4, {"no CUDA backend", "cpu"});
 }
 
+TEST_F(KerfCommand, SaysItsInstructionSetAndRefusesAWordThatIsNone) {
+  ASSERT_EQ(run_scene(kBlock).status, 0);
+  const std::string chosen = summary()["instruction_set"];
+  EXPECT_NE(kerf("info").out.find("mixed precision, " + chosen), std::string::npos);
+  fs::remove_all(root_ / "out");
+
+  ASSERT_EQ(setenv("KERF_INSTRUCTION_SET", "abacus", 1), 0);
+  const Outcome outcome = run_scene(kBlock);
+  unsetenv("KERF_INSTRUCTION_SET");
+
+  expect_refused(outcome, 2, {"KERF_INSTRUCTION_SET", "abacus", chosen});
+}
+
 TEST_F(KerfCommand, RefusesAFolderThatCannotBeWritten) {
   std::ofstream(root_ / "scene.toml") << kBlock;
   std::ofstream(root_ / "taken") << "x";
