@@ -456,10 +456,11 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
       out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
 }
 
-// Rounding in single precision can leave a singular matrix indefinite, so there the share grows.
+// What supports leave of a coarse matrix can be singular; rounding in single precision, and codes on
+// the levels between, make it indefinite by some 1e-6 of the diagonal. So there the share grows.
 template <class S>
 void FastBackend<S>::factor_coarsest() {
-  constexpr double kGrowth = 100, kMost = std::is_same_v<S, double> ? 0 : 1e-6;
+  constexpr double kGrowth = 100, kMost = std::is_same_v<S, double> ? 0 : 1e-4;
   const int last = static_cast<int>(levels_.size()) - 1;
   factored_ = false;
   for (double share = AssembledLevel::kShare;; share *= kGrowth) {

@@ -304,6 +304,32 @@ TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
   }
 }
 
+// Here the errors of 16-bit entries make the coarsest matrix indefinite, though the body is held.
+TEST(MixedPrecision, SolvesWhereCodedMatricesWouldBeIndefinite) {
+  constexpr double kTolerance = 1e-9;
+  LinkedOctree body(test::box_body({21, 14, 11}), 1);
+  test::cut_plane(body, {9.24, 5.88, 5.17}, {1, 0.2, 0.3}, 8);
+  ProblemOptions options;
+  options.coarsest_vertices = 200;
+  options.with_oracle = false;
+  const Problem p(std::move(body), options);
+  const auto backend = test::make_backend("mixed");
+  LinearSolver solver(*backend, {});
+  const int b = backend->add_vector(), x = backend->add_vector();
+  backend->load(p.hierarchy);
+  solver.set_structure(p.hierarchy);
+  backend->set_operator(kDynamic);
+  test::write(*backend, 0, x, p.deformation());
+  backend->rotate_cells(x);
+  solver.refresh();
+  test::write(*backend, 0, b, p.free_vector(0, 101));
+  backend->zero(0, x);
+  const SolveStats stats = solver.solve(b, x, kTolerance);
+  EXPECT_TRUE(stats.converged);
+  EXPECT_LE(stats.residual, kTolerance);
+  EXPECT_LT(stats.cycles, 40);
+}
+
 // A factor of slightly older rotations serves; one of another structure or operator does not.
 TEST(LinearSolver, KeepsTheFactorOfTheCoarsestLevelWhileItServes) {
   constexpr double kTolerance = 1e-9;
