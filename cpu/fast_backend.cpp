@@ -32,23 +32,11 @@ std::size_t FastBackend<S>::bytes() const {
                     bytes_of(exact_.rotation) + bytes_of(single_.rotation) +
                     bytes_of(exact_.materials) + bytes_of(single_.materials);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal);
-    for (const FastVector& vector : level.vectors)
-      sum += bytes_of(vector.single) + bytes_of(vector.exact);
+    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
+           level.vectors.bytes();
   }
   if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.factor_entries() * 12;
   return sum;
-}
-
-template <class S>
-void FastBackend<S>::allocate(FastVector& vector, const PatchedLevel& level, bool exact) const {
-  const std::size_t size = kTileScalars * level.tiles();
-  vector.single.clear();
-  vector.exact.clear();
-  if (exact || std::is_same_v<S, double>)
-    vector.exact.assign(size, 0.0);
-  else
-    vector.single.assign(size, 0.0F);
 }
 
 template <class T>
@@ -80,6 +68,12 @@ void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, Finest
     values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
 }
 
+// Peaks of runs: docs/results.md, under Memory.
+template <class S>
+double FastBackend<S>::bytes_per_cell() const noexcept {
+  return kIsDouble ? 2650 : 1450;
+}
+
 /// All of a level but its vectors.
 template <class S>
 void FastBackend<S>::load_level(std::size_t l) {
@@ -107,9 +101,8 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     load_level(l);
     FastLevel<S>& level = levels_[l];
-    level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
-    for (std::size_t x = 0; x < level.vectors.size(); ++x)
-      allocate(level.vectors[x], level.patched, x >= kLevelVectors);
+    level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
+                         kTileScalars * level.patched.tiles());
   }
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
@@ -141,9 +134,10 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
     load_level(l);
     auto& vectors = levels_[l].vectors;
     parallel(static_cast<std::int32_t>(vectors.size()), 2, [&](std::int32_t x) {
-      renumber(packed_before, levels_[l].patched, vectors[x].single);
-      renumber(packed_before, levels_[l].patched, vectors[x].exact);
+      renumber(packed_before, levels_[l].patched, vectors.held(x).single);
+      renumber(packed_before, levels_[l].patched, vectors.held(x).exact);
     });
+    vectors.set_scalars(kTileScalars * levels_[l].patched.tiles());
   }
   const FinestValues<double> before = std::move(exact_);
   const PatchedLevel& now = levels_[0].patched;
@@ -164,12 +158,16 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
 }
 
 template <class S>
-int FastBackend<S>::add_vector() {
-  if (!levels_.empty()) {
-    levels_[0].vectors.emplace_back();
-    allocate(levels_[0].vectors.back(), levels_[0].patched, true);
-  }
-  return vectors_on_finest_++;
+int FastBackend<S>::append_vector(bool exact) {
+  if (!levels_.empty()) levels_[0].vectors.append(exact);
+  exact_on_finest_.push_back(exact);
+  return static_cast<int>(exact_on_finest_.size()) - 1;
+}
+
+template <class S>
+void FastBackend<S>::release(int x) {
+  settle();
+  if (!levels_.empty()) levels_[0].vectors.release(x);
 }
 
 template <class S>

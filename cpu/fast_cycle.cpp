@@ -133,6 +133,7 @@ void FastBackend<S>::restrict_residual(int fine) {
   const SparseWeights& rows = from.patched.restrict_;
   const S* r = from.at(kResidual);
   S* f = to.at(kRight);
+  constexpr S part = S(1) / SparseWeights::kWhole;  // a power of two: the same bits at the end
   for_tiles(0, to.tiles(), [&](std::size_t tile) {
     alignas(32) S sums[kTileScalars];
     for (std::size_t k = 0; k < kGroup; ++k) {
@@ -145,7 +146,7 @@ void FastBackend<S>::restrict_residual(int fine) {
         y = std::fma(w, at[kGroup], y);
         z = std::fma(w, at[2 * kGroup], z);
       }
-      sums[k] = x, sums[kGroup + k] = y, sums[2 * kGroup + k] = z;
+      sums[k] = part * x, sums[kGroup + k] = part * y, sums[2 * kGroup + k] = part * z;
     }
     for_packs<S>([&](int first) {
       store_tile(f, tile, first,
@@ -177,6 +178,7 @@ template <class S>
 Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t tile,
                                          int first) const {
   using R = typename Record<S>::Vector;
+  constexpr S part = S(1) / SparseWeights::kWhole;
   const SparseWeights& rows = to.patched.prolong;
   alignas(32) S sums[4 * Pack<S>::kLanes];
   for (int k = 0; k < Pack<S>::kLanes; ++k) {
@@ -187,6 +189,7 @@ Vec3<Pack<S>> FastBackend<S>::correction(const FastLevel<S>& to, std::size_t til
       __builtin_memcpy(&one, coarse_records_.data() + 4 * std::size_t(rows.vertex[i]), sizeof one);
       sum += static_cast<S>(rows.weight[i]) * one;
     }
+    sum *= part;
     __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
   }
   return masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first));
@@ -266,7 +269,7 @@ template <class S>
 void FastBackend<S>::zero(int level, int x) {
   if (waiting_ >= 0 && !(waiting_ == level && x == kSolution)) settle();
   if (waiting_ == level) waiting_ = -1;
-  FastVector& vector = levels_[level].vectors[x];
+  FastVector& vector = levels_[level].vectors.held(x);
   std::fill(vector.single.begin(), vector.single.end(), 0.0F);
   std::fill(vector.exact.begin(), vector.exact.end(), 0.0);
   if (x == kSolution) levels_[level].solution_is_zero = true;
@@ -410,7 +413,9 @@ void FastBackend<S>::read(int level, int x, std::span<double> values) const {
   const FastLevel<S>& l = levels_[level];
   expects(values.size() == 3 * l.patched.packed.size(),
           "read: three values per vertex of the level");
-  with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
+  const FastVector& vector = l.vectors.held(x);
+  if (vector.is_empty()) return std::fill(values.begin(), values.end(), 0.0);
+  with_types(vector, vector, [&](const auto* from, const auto*) {
     for (std::size_t v = 0; v < l.patched.packed.size(); ++v)
       for (std::size_t c = 0; c < 3; ++c)
         values[3 * v + c] = from[scalar_of(l.patched.packed[v]) + kGroup * c];
@@ -436,7 +441,9 @@ void FastBackend<S>::read_some(int level, int x, std::span<const std::int32_t> v
                                std::span<double> values) const {
   const_cast<FastBackend*>(this)->settle();
   const FastLevel<S>& l = levels_[level];
-  with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
+  const FastVector& vector = l.vectors.held(x);
+  if (vector.is_empty()) return std::fill(values.begin(), values.end(), 0.0);
+  with_types(vector, vector, [&](const auto* from, const auto*) {
     for (std::size_t k = 0; k < values.size(); ++k)
       values[k] = from[scalar_of(l.patched.packed[vertices[k / 3]]) + kGroup * (k % 3)];
   });

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "cpu/number_table.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf::cpu {
@@ -70,7 +71,7 @@ std::uint64_t place_key(const Vec3i& p) {
 /// The points of one patch after the other.
 class Numbering {
  public:
-  explicit Numbering(const Level& level) : level_(level), first_(level.point.size(), -1) {}
+  explicit Numbering(const Level& level) : level_(level) {}
 
   /// Corners and slots of the draft's cells, as points.
   void number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots) {
@@ -83,7 +84,7 @@ class Numbering {
     const std::size_t vertices = draft.vertices.size();
     for (std::size_t n = 0; n < draft.cells.size(); ++n)
       corners.push_back(corners_of(draft, n, slots[n]));
-    for (const std::int32_t v : draft.vertices) first_[v] = -1;
+    first_.clear();
     sort(draft, vertices);
     for (auto* all : {&corners, &slots})
       for (Corners& of : *all)
@@ -92,12 +93,13 @@ class Numbering {
 
  private:
   std::uint16_t vertex(std::int32_t v, Draft& draft) {
-    if (first_[v] < 0) {
-      first_[v] = size_of(draft.vertices.size());
+    std::int32_t& first = first_[v];
+    if (first < 0) {
+      first = size_of(draft.vertices.size());
       draft.vertices.push_back(v);
       places_.push_back(place_key(level_.point[v]));
     }
-    return static_cast<std::uint16_t>(first_[v]);
+    return static_cast<std::uint16_t>(first);
   }
 
   Corners corners_of(Draft& draft, std::size_t n, const Corners& slots) {
@@ -161,7 +163,7 @@ class Numbering {
   }
 
   const Level& level_;
-  std::vector<std::int32_t> first_;
+  NumberTable first_;  // of vertices, in the order in which they are met
   std::vector<std::uint64_t> places_;  // of points as they were met: vertices, then hanging ones
   std::vector<std::tuple<std::uint64_t, std::int32_t, std::uint16_t>> order_;
   std::vector<std::uint16_t> rank_;
@@ -380,6 +382,8 @@ void number_vertices(std::vector<Draft>& drafts, PatchedLevel& out) {
     if (owner[v] == kShared) out.vertex.push_back(v);
   fill_to_tile(out.vertex);
   out.vertex.resize(out.vertex.size() + kGroup, -1);
+  out.vertex.shrink_to_fit();
+  out.own_point.shrink_to_fit();
   out.packed.assign(level.point.size(), -1);
   out.fixed.assign(out.vertex.size(), 0);
   for (std::size_t k = 0; k < out.vertex.size(); ++k) {
@@ -413,37 +417,46 @@ void number_copies(const std::vector<Draft>& drafts, PatchedLevel& out) {
     out.copies_of[next[out.copy_vertex[k] - out.first_shared]++] = size_of(k);
 }
 
+/// What drafts have under `part`, one after the other.
 template <class T>
-void append(std::vector<T>& to, const std::vector<T>& from) {
-  to.insert(to.end(), from.begin(), from.end());
+void join(std::vector<Draft>& drafts, std::vector<T> Draft::* part, std::vector<T>& to) {
+  std::size_t size = 0;
+  for (const Draft& draft : drafts) size += (draft.*part).size();
+  to.reserve(size);
+  for (Draft& draft : drafts) {
+    to.insert(to.end(), (draft.*part).begin(), (draft.*part).end());
+    draft.*part = {};
+  }
 }
 
 /// Cells and hanging corners of all patches, one after the other.
-void join(const std::vector<Draft>& drafts, PatchedLevel& out) {
+void join(std::vector<Draft>& drafts, PatchedLevel& out) {
+  std::int32_t group = 0, hanging = 0, folds = 0;
   for (std::size_t p = 0; p < drafts.size(); ++p) {
     const Draft& draft = drafts[p];
     Patch& patch = out.patches[p];
-    patch.first_group = size_of(out.groups());
+    patch.first_group = group;
     patch.groups = size_of(draft.cells.size() / kGroup);
-    patch.first_hanging = size_of(out.hanging_masters.size());
+    patch.first_hanging = hanging;
     patch.hanging = size_of(draft.masters.size());
     patch.points = size_of(draft.vertices.size()) + patch.hanging + 1;
-    std::int32_t at = size_of(out.slots.size() / (8 * kGroup));
-    for (const std::uint8_t folded : draft.folded) out.slots_at.push_back(folded ? at++ : -1);
-    append(out.cell, draft.cells);
-    append(out.corners, draft.corners);
-    append(out.slots, draft.slots);
-    append(out.row, draft.row);
-    append(out.kind, draft.kind);
-    append(out.hanging_point, draft.hanging_point);
-    append(out.hanging_masters, draft.masters);
+    group += patch.groups;
+    hanging += patch.hanging;
+    for (const std::uint8_t folded : draft.folded) out.slots_at.push_back(folded ? folds++ : -1);
   }
+  join(drafts, &Draft::cells, out.cell);
+  join(drafts, &Draft::corners, out.corners);
+  join(drafts, &Draft::slots, out.slots);
+  join(drafts, &Draft::row, out.row);
+  join(drafts, &Draft::kind, out.kind);
+  join(drafts, &Draft::hanging_point, out.hanging_point);
+  join(drafts, &Draft::masters, out.hanging_masters);
   out.lane.assign(out.level->corner.size(), -1);
   for (std::size_t lane = 0; lane < out.cell.size(); ++lane)
     if (out.cell[lane] >= 0) out.lane[out.cell[lane]] = size_of(lane);
 }
 
-using Weights = std::array<std::array<float, 8>, 8>;
+using Weights = std::array<std::array<std::uint8_t, 8>, 8>;  // in 1 / SparseWeights::kWhole
 
 /// The weights between slots of a child and of its parent; there are few different ones.
 class WeightTable {
@@ -455,7 +468,12 @@ class WeightTable {
     if (added) {
       float w[8][8];
       kernels::transfer_weights(child, place, parent, w);
-      for (std::size_t i = 0; i < 8; ++i) std::copy_n(w[i], 8, entry->second[i].begin());
+      for (std::size_t i = 0; i < 8; ++i)
+        for (std::size_t m = 0; m < 8; ++m) {
+          const float parts = SparseWeights::kWhole * w[i][m];
+          entry->second[i][m] = static_cast<std::uint8_t>(parts);
+          ensures(static_cast<float>(entry->second[i][m]) == parts, "a weight is no part of 64");
+        }
     }
     return entry->second;
   }
@@ -528,6 +546,7 @@ void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine) {
       if (first[level.slots[c][i]] < 0) first[level.slots[c][i]] = 8 * c + size_of(i);
   WeightTable table;
   SparseWeights& rows = fine.prolong;
+  rows.begin.reserve(fine.vertex.size() + 1);
   rows.begin.push_back(0);
   for (const std::int32_t v : fine.vertex) {
     if (v >= 0) {
@@ -542,6 +561,8 @@ void fill_weights(const PatchedLevel& coarse, PatchedLevel& fine) {
     }
     rows.begin.push_back(size_of(rows.vertex.size()));
   }
+  rows.vertex.shrink_to_fit();
+  rows.weight.shrink_to_fit();
   fine.restrict_ = transposed(rows, coarse.vertices());
 }
 

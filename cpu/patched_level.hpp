@@ -33,7 +33,8 @@ inline constexpr std::size_t kTileScalars = 3 * kGroup;
 struct SparseWeights {
   std::vector<std::int32_t> begin;   // per row + 1
   std::vector<std::int32_t> vertex;  // packed, of the other level
-  std::vector<float> weight;         // multiples of 1/64: exact
+  std::vector<std::uint8_t> weight;  // in 1 / kWhole: exact
+  static constexpr int kWhole = 64;
 };
 
 /// How the matrix of a cell of a stored level comes about; cells of a group are alike.
