@@ -32,12 +32,6 @@ Vec3d up_direction(const SimulationSetup& setup) {
   return {0, 1, 0};
 }
 
-Box3 deformed_box(const Snapshot& s) {
-  Box3 box;
-  for (std::size_t i = 0; i < s.points.size(); ++i) box.add(s.points[i] + s.displacement[i]);
-  return box;
-}
-
 /// One run, from its first step to its files.
 class Run {
  public:
@@ -128,9 +122,8 @@ class Run {
   void write_state() {
     const int step = simulation_steps();
     const double time = simulation_.time();
-    snapshot_ = simulation_.snapshot();
+    if (scene_.output.vtu) results_.add_snapshot(step, time, simulation_.snapshot());
     surface_ = simulation_.surface_mesh();
-    results_.add_snapshot(step, time, snapshot_);
     if (scene_.setup.surface != SurfaceMethod::none) {
       const std::string left_out = results_.add_surface(step, time, surface_);
       if (!left_out.empty()) warn(left_out);
@@ -193,8 +186,8 @@ class Run {
     summary_.state_hash = s.state_hash();
     summary_.warnings.insert(summary_.warnings.begin(), s.warnings().begin(), s.warnings().end());
     // A blade may still be on its way in a run that stopped early.
-    if (static_cast<int>(summary_.steps.size()) >= simulation_.steps_planned())
-      missed_ = missed_blades(scene_, hits_, deformed_box(snapshot_));
+    if (!hits_.empty() && static_cast<int>(summary_.steps.size()) >= simulation_.steps_planned())
+      missed_ = missed_blades(scene_, hits_, s.deformed_box());
     if (!missed_.empty()) summary_.warnings.push_back(missed_);
   }
 
@@ -233,8 +226,7 @@ class Run {
   ResultsFolder& results_;
   ProgressBar bar_;
   Summary summary_;
-  Snapshot snapshot_;              // of step last_written_
-  SurfaceMesh surface_;            // the same; empty if the scene asks for none
+  SurfaceMesh surface_;            // of step last_written_; empty if the scene asks for none
   std::vector<std::size_t> hits_;  // links met, per cut
   std::chrono::steady_clock::time_point begin_{};
   std::string missed_;

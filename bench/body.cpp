@@ -56,7 +56,7 @@ Hierarchy Body::build_levels(const LinkedOctree& octree) const {
     out.values.push_back(
         {setup_.material.young * side, setup_.material.density * side * side * side, 0});
   }
-  std::vector<double> held;
+  std::vector<HeldComponent> held;
   apply_supports(octree.lattice(), setup_.supports, level, 0, held);
   std::size_t pieces = 0;
   const std::vector<std::int32_t> piece = label_pieces(octree, &pieces);

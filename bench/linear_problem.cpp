@@ -27,7 +27,7 @@ LinearProblem::LinearProblem(const ProblemSetup& setup) : setup_(setup) {
     const double side = lattice.spacing * (1 << log2);
     hierarchy_.values.push_back({side, side * side * side, 0});
   }
-  std::vector<double> held;
+  std::vector<HeldComponent> held;
   apply_supports(lattice, {{{{-1, -1e-9, -1}, {2, 1e-9, 2}}, {}, {true, true, true}}},
                  hierarchy_.levels[0], 0, held);
   build_coarse_levels(hierarchy_, {setup.solver.coarsest_vertices, setup.solver.max_levels,

@@ -4,6 +4,10 @@
 #include "core/base/error.hpp"
 
 namespace kerf {
+
+// The reference backend in double: docs/results.md, under Memory.
+double Backend::bytes_per_cell() const noexcept { return 2700; }
+
 namespace {
 
 constexpr const char* kNoUpdates = "a backend without updates is asked for one";

@@ -58,6 +58,9 @@ class Backend {
   virtual const char* instruction_set() const noexcept { return ""; }
   virtual int threads() const noexcept = 0;
   virtual std::size_t bytes() const = 0;
+  /// About how much memory of this machine a run takes for each cell of a refined body, all that
+  /// others hold of it included; its surface is not.
+  virtual double bytes_per_cell() const noexcept;
 
   // Structure.
   /// Topology; again after each cut. Vectors and rotations are then zero and identity.
@@ -66,9 +69,16 @@ class Backend {
   /// Whether the functions under "Updates" are there. Else the caller packs the hierarchy after a
   /// cut (Hierarchy::pack), loads it, and writes all that it wants kept.
   virtual bool can_update() const noexcept { return false; }
+  /// Whether Level::incidences_of is asked for, other than of the coarsest level.
+  virtual bool reads_incidences() const noexcept { return true; }
   virtual void set_smoother(const SmootherOptions& options) = 0;
   /// One more vector on level 0; stays through later loads.
   virtual int add_vector() = 0;
+  /// The same for what may be rounded to the precision of the cycle: not a force, nor what one is
+  /// made from, nor for the fused operations of conjugate gradients.
+  virtual int add_rough_vector() { return add_vector(); }
+  /// One that was added is zero from now on; its memory may be given back until it is used again.
+  virtual void release(int x) { zero(0, x); }
 
   // Values.
   virtual void set_operator(const OperatorScale& scale) = 0;
@@ -77,9 +87,10 @@ class Backend {
   /// R of every cell of level 0 as a unit quaternion, four doubles a cell: w x y z.
   virtual void read_rotations(std::span<double> out) const = 0;
   virtual void write_rotations(std::span<const double> in) = 0;
-  virtual void coarsen(int fine) = 0;   ///< matrices of fine + 1 from fine
-  virtual void prepare(int level) = 0;  ///< diagonal blocks, and the bound for Chebyshev
-  virtual void factor_coarsest() = 0;   ///< throws Error (bad_input) if a piece is not held
+  virtual void coarsen(int fine) = 0;  ///< matrices of fine + 1 from fine
+  /// Diagonal blocks, and the bound for Chebyshev. Leaves anything in u, f, r and the direction.
+  virtual void prepare(int level) = 0;
+  virtual void factor_coarsest() = 0;  ///< throws Error (bad_input) if a piece is not held
   /// Whether there is a factor, of this structure and operator; perhaps of older rotations.
   virtual bool has_factor() const noexcept = 0;
   /// Lower triangle of the matrix of a cell over its slots, 300 doubles (kernels/layout.hpp).

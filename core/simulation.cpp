@@ -130,9 +130,8 @@ void Simulation::Impl::start() {
   state.memory = backend->add_vector();
   state.external = backend->add_vector();
   if (setup.time.mode == TimeMode::dynamic) {
-    before_step.displacement = backend->add_vector();
-    before_step.velocity = backend->add_vector();
-    before_step.memory = backend->add_vector();
+    before_step.displacement = backend->add_rough_vector();
+    before_step.velocity = backend->add_rough_vector();
     motion =
         std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver, state);
   } else {
@@ -148,9 +147,11 @@ void Simulation::Impl::start() {
   warn_of_idle_supports();
   warn_of_pieces();
   load_structure();
-  const std::vector<double> zero(3 * finest().point.size(), 0.0);
-  backend->write(0, state.displacement, structure->hold(zero, 0, true));
   prescribed = structure->is_prescribed();
+  if (prescribed) {
+    std::vector<double> zero(3 * finest().point.size(), 0.0);
+    backend->write(0, state.displacement, structure->hold(std::move(zero), 0, true));
+  }
   if (motion) {
     const AddTime timer(clock.step);
     motion->start();
@@ -169,7 +170,8 @@ void Simulation::Impl::start() {
 void Simulation::Impl::build_structure() {
   check_memory();
   const AddTime timer(clock.structure);
-  structure = std::make_unique<Structure>(setup, body);
+  const bool assembles = setup.solver.method == SolverMethod::cholesky;
+  structure = std::make_unique<Structure>(setup, body, assembles || backend->reads_incidences());
   for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
 }
 
@@ -192,6 +194,7 @@ void Simulation::Impl::load_structure() {
     backend->load(hierarchy());
     backend->write(0, state.external, structure->external().on_all(hierarchy()));
     backend->mask(0, state.external);
+    return_freed_memory();
   }
   solver.set_structure(hierarchy());
 }
@@ -216,11 +219,12 @@ void Simulation::Impl::move_surface() {
   backend->surface_normals(view, positions, normals);
 }
 
-// Before levels, matrices and vectors are allocated: all that exists are the leaves. Measured on
-// uniform and refined bodies: 1900 to 2700 bytes a cell at 10^5 cells and more.
+// Before levels, matrices and vectors are allocated: all that exists are the leaves. Uniform bodies
+// have no hanging corners and one vertex a cell, which saves more in double than in mixed.
 void Simulation::Impl::check_memory() const {
-  constexpr double kBytesPerCell = 2700;
-  const double bytes = kBytesPerCell * static_cast<double>(body.leaf_count());
+  constexpr double kUniform = 0.6, kUniformWithBlades = 0.75;
+  double bytes = backend->bytes_per_cell() * static_cast<double>(body.leaf_count());
+  if (setup.body.refinement == 0) bytes *= setup.cuts.empty() ? kUniform : kUniformWithBlades;
   const double available = physical_memory();
   if (bytes < 0.9 * available) return;
   throw Error(
@@ -306,6 +310,7 @@ std::array<std::pair<int, bool>, 3> Simulation::Impl::state_vectors() const {
 
 void Simulation::Impl::change_structure(const CutEvent& event) {
   const bool keeps = backend->can_update();
+  if (equilibrium) equilibrium->release();  // there is room for new patches then
   Kept kept;
   if (!keeps) kept = read_state(finest().vertices(), finest().cells());
   bool in_place = false;
@@ -390,12 +395,13 @@ void Simulation::Impl::update_backend() {
 void Simulation::Impl::copy_state(const StateVectors& from, const StateVectors& to) {
   backend->copy(0, from.displacement, to.displacement);
   backend->copy(0, from.velocity, to.velocity);
-  backend->copy(0, from.memory, to.memory);
 }
 
-// The last good state is worth more than one that is no number; the run ends with it.
+// The last good state is worth more than one that is no number; the run ends with it, so that the
+// acceleration is not asked for again.
 void Simulation::Impl::step_back() {
   copy_state(before_step, state);
+  backend->zero(0, state.memory);
   backend->rotate_cells(state.displacement);
   stopped = true;
   warnings.push_back(
@@ -560,6 +566,15 @@ std::uint64_t Simulation::state_hash() const {
       }
     }
   return hash;
+}
+
+Box3 Simulation::deformed_box() const {
+  const std::vector<double> u = impl_->read_vector(impl_->state.displacement);
+  Box3 box;
+  for (std::size_t v = 0; v < impl_->finest().point.size(); ++v)
+    box.add(impl_->body.lattice().point(impl_->finest().point[v]) +
+            Vec3d{u[3 * v], u[3 * v + 1], u[3 * v + 2]});
+  return box;
 }
 
 double Simulation::volume() const {

@@ -112,6 +112,8 @@ class Simulation {
   std::uint64_t state_hash() const;
   /// Volume of the cells, m^3; cuts do not change it.
   double volume() const;
+  /// Of all vertices where they are now, m.
+  Box3 deformed_box() const;
   /// Positions of the corners of all leaves, eight per leaf in the order of body().leaves().
   std::vector<Vec3d> deformed_corners() const;
 

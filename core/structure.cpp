@@ -30,7 +30,7 @@ void merge_into(std::vector<std::int32_t>& list, std::vector<std::int32_t> more)
 
 }  // namespace
 
-Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body)
+Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body, bool reads_incidences)
     : setup_(&setup),
       hierarchy_(start_hierarchy(setup, body)),
       external_(body.lattice(), setup.loads, hierarchy_.levels[0]) {
@@ -38,11 +38,11 @@ Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body)
   hierarchy_.values.reserve(with_room(level.corner.size()));
   hierarchy_.values.resize(level.corner.size());
   for (std::int32_t c = 0; c < level.cells(); ++c) set_values(body, c);
-  held_.reserve(3 * with_room(level.point.size()));
   labels_.build(level);
   merge_into(opened_, opened_cells(body));
   hold_again(body);
   build_coarse_levels(hierarchy_, options());
+  if (setup.cuts.empty() && !reads_incidences) hierarchy_.forget_neighbours();
 }
 
 HierarchyOptions Structure::options() const {
@@ -56,8 +56,8 @@ void Structure::set_values(const LinkedOctree& body, std::int32_t cell) {
                                  ? setup_->material
                                  : setup_->regions[node.material - std::size_t{1}].material;
   const double side = hierarchy_.spacing * (1 << node.size_log2);
-  hierarchy_.values[cell] = {material.young * side, material.density * side * side * side,
-                             node.material};
+  hierarchy_.values.set(
+      cell, {material.young * side, material.density * side * side * side, node.material});
 }
 
 // All supports and, in static mode, crumbs. Returns the vertices that are held otherwise than
@@ -122,17 +122,30 @@ std::vector<double> Structure::hold(std::vector<double> values, std::int32_t fir
                                     bool is_displacement) const {
   for (std::size_t k = 0; k < values.size(); ++k) {
     const std::size_t at = 3 * static_cast<std::size_t>(first) + k;
-    if ((finest().fixed[at / 3] >> (at % 3)) & 1) values[k] = is_displacement ? held_[at] : 0;
+    if ((finest().fixed[at / 3] >> (at % 3)) & 1) values[k] = is_displacement ? held_at(at) : 0;
   }
   return values;
 }
 
-bool Structure::is_prescribed() const {
-  return std::any_of(held_.begin(), held_.end(), [](double x) { return x != 0; });
+double Structure::held_at(std::size_t component) const {
+  const auto found = std::lower_bound(
+      held_.begin(), held_.end(), component,
+      [](const HeldComponent& h, std::size_t wanted) { return h.component < wanted; });
+  return found != held_.end() && found->component == component ? found->displacement : 0;
 }
 
 void Structure::hold_crumbs_at(const std::vector<double>& displacement) {
-  for (const std::size_t k : crumbs_.components) held_[k] = displacement[k];
+  if (!has_crumbs()) return;
+  std::vector<HeldComponent> crumbs, others;
+  for (const std::size_t k : crumbs_.components) crumbs.push_back({k, displacement[k]});
+  const auto less = [](const HeldComponent& a, const HeldComponent& b) {
+    return a.component < b.component;
+  };
+  std::set_difference(held_.begin(), held_.end(), crumbs.begin(), crumbs.end(),
+                      std::back_inserter(others), less);
+  held_.clear();
+  std::merge(others.begin(), others.end(), crumbs.begin(), crumbs.end(), std::back_inserter(held_),
+             less);
 }
 
 }  // namespace kerf

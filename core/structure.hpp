@@ -20,8 +20,9 @@ namespace kerf {
 
 class Structure {
  public:
-  /// `setup` must outlive this.
-  Structure(const SimulationSetup& setup, const LinkedOctree& body);
+  /// `setup` must outlive this. `reads_incidences`: whether others do so; if not, and no blade is
+  /// to come, much of the levels is not kept.
+  Structure(const SimulationSetup& setup, const LinkedOctree& body, bool reads_incidences = true);
 
   /// After a blade pass that changed something. Returns whether the coarse levels changed in place;
   /// else they were built anew. Level 0 always changes in place.
@@ -47,12 +48,12 @@ class Structure {
   std::vector<double> hold(std::vector<double> values, std::int32_t first,
                            bool is_displacement) const;
   /// Whether some held displacement is not zero.
-  bool is_prescribed() const;
+  bool is_prescribed() const { return !held_.empty(); }
   bool has_crumbs() const { return !crumbs_.components.empty(); }
   /// Crumbs stay where they are: at `displacement`, three for each vertex.
   void hold_crumbs_at(const std::vector<double>& displacement);
   std::size_t bytes() const {
-    return hierarchy_.bytes() + labels_.bytes() + held_.size() * sizeof(double) +
+    return hierarchy_.bytes() + labels_.bytes() + held_.size() * sizeof(held_[0]) +
            opened_.size() * sizeof(std::int32_t);
   }
   /// Warnings since the last call.
@@ -62,13 +63,14 @@ class Structure {
   void set_values(const LinkedOctree& body, std::int32_t cell);
   std::vector<std::int32_t> hold_again(const LinkedOctree& body);
   HierarchyOptions options() const;
+  double held_at(std::size_t component) const;
 
   const SimulationSetup* setup_;
   Hierarchy hierarchy_;
   LevelUpdater updater_;
   PieceLabels labels_;
   std::vector<std::int32_t> opened_;
-  std::vector<double> held_;  // displacement of held components, three for each vertex
+  std::vector<HeldComponent> held_;  // ascending; other held components are held at zero
   FrozenCrumbs crumbs_;
   std::vector<std::string> warnings_;
   ExternalForce external_;  // last: needs level 0

@@ -29,23 +29,11 @@ std::size_t FastBackend<S>::bytes() const {
                     bytes_of(single_.rotation) + bytes_of(exact_.materials) +
                     bytes_of(single_.materials);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal);
-    for (const FastVector& vector : level.vectors)
-      sum += bytes_of(vector.single) + bytes_of(vector.exact);
+    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
+           level.vectors.bytes();
   }
   if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.factor_entries() * 12;
   return sum;
-}
-
-template <class S>
-void FastBackend<S>::allocate(FastVector& vector, const PatchedLevel& level, bool exact) const {
-  const std::size_t size = kTileScalars * level.tiles();
-  vector.single.clear();
-  vector.exact.clear();
-  if (exact || std::is_same_v<S, double>)
-    vector.exact.assign(size, 0.0);
-  else
-    vector.single.assign(size, 0.0F);
 }
 
 template <class T>
@@ -76,6 +64,12 @@ void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, Finest
   values.no_rotation(0, finest.groups());
 }
 
+// Peaks of runs: docs/results.md, under Memory.
+template <class S>
+double FastBackend<S>::bytes_per_cell() const noexcept {
+  return kIsDouble ? 2650 : 1450;
+}
+
 template <class S>
 void FastBackend<S>::load_coarsest() {
   coarsest_ = std::make_unique<AssembledLevel>(hierarchy_->levels.back());
@@ -95,9 +89,8 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
     level.bound = 0;
     level.solution_is_zero = false;
     level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
-    level.vectors.resize(l == 0 ? vectors_on_finest_ : kLevelVectors);
-    for (std::size_t x = 0; x < level.vectors.size(); ++x)
-      allocate(level.vectors[x], level.patched, x >= kLevelVectors);
+    level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
+                         kTileScalars * level.patched.tiles());
   }
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
@@ -146,9 +139,10 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
     const std::size_t size = kTileScalars * level.patched.tiles();
     level.inverse_diagonal.resize(2 * size, 0);
     parallel(static_cast<std::int32_t>(level.vectors.size()), 2, [&](std::int32_t x) {
-      renumber(moves.vertices, size, level.vectors[x].single);
-      renumber(moves.vertices, size, level.vectors[x].exact);
+      renumber(moves.vertices, size, level.vectors.held(static_cast<std::size_t>(x)).single);
+      renumber(moves.vertices, size, level.vectors.held(static_cast<std::size_t>(x)).exact);
     });
+    level.vectors.set_scalars(size);
     if (l > 0) continue;
     renumber(moves, level.patched, exact_);
     if constexpr (!std::is_same_v<S, double>) renumber(moves, level.patched, single_);
@@ -157,12 +151,16 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
 }
 
 template <class S>
-int FastBackend<S>::add_vector() {
-  if (!levels_.empty()) {
-    levels_[0].vectors.emplace_back();
-    allocate(levels_[0].vectors.back(), levels_[0].patched, true);
-  }
-  return vectors_on_finest_++;
+int FastBackend<S>::append_vector(bool exact) {
+  if (!levels_.empty()) levels_[0].vectors.append(exact);
+  exact_on_finest_.push_back(exact);
+  return static_cast<int>(exact_on_finest_.size()) - 1;
+}
+
+template <class S>
+void FastBackend<S>::release(int x) {
+  settle();
+  if (!levels_.empty()) levels_[0].vectors.release(x);
 }
 
 template <class S>
@@ -456,8 +454,8 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
       out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
 }
 
-// What supports leave of a coarse matrix can be singular; rounding in single precision, and codes on
-// the levels between, make it indefinite by some 1e-6 of the diagonal. So there the share grows.
+// What supports leave of a coarse matrix can be singular; rounding in single precision, and codes
+// on the levels between, make it indefinite by some 1e-6 of the diagonal. So there the share grows.
 template <class S>
 void FastBackend<S>::factor_coarsest() {
   constexpr double kGrowth = 100, kMost = std::is_same_v<S, double> ? 0 : 1e-4;

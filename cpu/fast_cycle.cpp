@@ -76,11 +76,12 @@ void FastBackend<S>::chebyshev(int level) {
     return load_tile(static_cast<const S*>(u), tile, first) +
            masked(transfer_here<S>()->taken(tile, first), l.fixed(tile, first));
   };
+  const S* correction = waiting_ == level ? levels_[level + 1].at(kSolution) : nullptr;
   const auto start = [&](std::size_t patch) {
     auto& points = transfer_here<S>();
     if (waiting_ != level) return points.reset();
     points.emplace(l.patched, patch);
-    points->load(levels_[level + 1].patched, levels_[level + 1].at(kSolution));
+    points->load(levels_[level + 1].patched, correction);
   };
   const auto as_it_is = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first);
@@ -172,12 +173,14 @@ void FastBackend<S>::correct_shared(int level) {
   FastLevel<S>& l = levels_[level];
   FastLevel<S>& next = levels_[level + 1];
   const auto patches = static_cast<std::int32_t>(l.patched.patches.size());
+  const S* from = next.at(kSolution);
+  S* to = l.at(kSolution);
 #pragma omp parallel for num_threads(threads_) \
     schedule(dynamic, 1) if (l.patched.cell.size() >= kWorthCells)
   for (std::int32_t p = 0; p < patches; ++p) {
     TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
-    points.load(next.patched, next.at(kSolution));
-    points.add_to_leads(l.at(kSolution));
+    points.load(next.patched, from);
+    points.add_to_leads(to);
   }
 }
 
@@ -196,10 +199,11 @@ void FastBackend<S>::settle() {
   FastLevel<S>& next = levels_[waiting_ + 1];
   correct_shared(waiting_);
   waiting_ = -1;
+  const S* from = next.at(kSolution);
   S* u = l.at(kSolution);
   parallel(static_cast<std::int32_t>(l.patched.patches.size()), 2, [&](std::int32_t p) {
     TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
-    points.load(next.patched, next.at(kSolution));
+    points.load(next.patched, from);
     const Range& own = l.patched.patches[p].own;
     for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
       const auto tile = static_cast<std::size_t>(t);
@@ -263,7 +267,7 @@ template <class S>
 void FastBackend<S>::zero(int level, int x) {
   if (waiting_ >= 0 && !(waiting_ == level && x == kSolution)) settle();
   if (waiting_ == level) waiting_ = -1;
-  FastVector& vector = levels_[level].vectors[x];
+  FastVector& vector = levels_[level].vectors.held(x);
   std::fill(vector.single.begin(), vector.single.end(), 0.0F);
   std::fill(vector.exact.begin(), vector.exact.end(), 0.0);
   if (x == kSolution) levels_[level].solution_is_zero = true;
@@ -407,7 +411,9 @@ void FastBackend<S>::read(int level, int x, std::span<double> values) const {
   const FastLevel<S>& l = levels_[level];
   expects(values.size() == 3 * l.patched.packed.size(),
           "read: three values per vertex of the level");
-  with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
+  const FastVector& vector = l.vectors.held(x);
+  if (vector.is_empty()) return std::fill(values.begin(), values.end(), 0.0);
+  with_types(vector, vector, [&](const auto* from, const auto*) {
     for (std::size_t v = 0; v < l.patched.packed.size(); ++v)
       for (std::size_t c = 0; c < 3; ++c)
         values[3 * v + c] = from[scalar_of(l.patched.packed[v]) + kGroup * c];
@@ -433,7 +439,9 @@ void FastBackend<S>::read_some(int level, int x, std::span<const std::int32_t> v
                                std::span<double> values) const {
   const_cast<FastBackend*>(this)->settle();
   const FastLevel<S>& l = levels_[level];
-  with_types(l.vectors[x], l.vectors[x], [&](const auto* from, const auto*) {
+  const FastVector& vector = l.vectors.held(x);
+  if (vector.is_empty()) return std::fill(values.begin(), values.end(), 0.0);
+  with_types(vector, vector, [&](const auto* from, const auto*) {
     for (std::size_t k = 0; k < values.size(); ++k)
       values[k] = from[scalar_of(l.patched.packed[vertices[k / 3]]) + kGroup * (k % 3)];
   });

@@ -41,6 +41,49 @@ struct FastVector {
       return exact;
   }
   bool is_exact() const { return single.empty(); }
+  bool is_empty() const { return single.empty() && exact.empty(); }
+};
+
+/// The vectors of a level, by VectorId. One that is zero may have no memory until it is asked for,
+/// so that what a run never uses costs nothing.
+class LazyVectors {
+ public:
+  /// Forgets all. `exact`: of each vector, whether it is double. `scalars`: of one vector.
+  void assign(std::vector<bool> exact, std::size_t scalars) {
+    exact_ = std::move(exact);
+    all_.clear();
+    all_.resize(exact_.size());
+    scalars_ = scalars;
+  }
+  void append(bool exact) {
+    exact_.push_back(exact);
+    all_.emplace_back();
+  }
+  void release(std::size_t x) { all_[x] = {}; }
+  /// Of vectors that are asked for from now on.
+  void set_scalars(std::size_t scalars) { scalars_ = scalars; }
+  std::size_t size() const { return all_.size(); }
+  bool is_exact(std::size_t x) const { return exact_[x]; }
+
+  FastVector& operator[](std::size_t x) {
+    FastVector& vector = all_[x];
+    if (vector.is_empty() && exact_[x]) vector.exact.resize(scalars_);
+    if (vector.is_empty() && !exact_[x]) vector.single.resize(scalars_);
+    return vector;
+  }
+  /// As it is: empty if it is zero and was not asked for.
+  FastVector& held(std::size_t x) { return all_[x]; }
+  const FastVector& held(std::size_t x) const { return all_[x]; }
+  std::size_t bytes() const {
+    std::size_t sum = 0;
+    for (const FastVector& vector : all_) sum += bytes_of(vector.single) + bytes_of(vector.exact);
+    return sum;
+  }
+
+ private:
+  std::vector<bool> exact_;
+  std::vector<FastVector> all_;
+  std::size_t scalars_ = 0;
 };
 
 /// Calls body(from, to) with the typed arrays of two vectors.
@@ -63,8 +106,8 @@ struct FastLevel {
   PatchedLevel patched;
   StoredMatrices<S> matrices;       // levels above 0
   std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][8]
-  std::vector<FastVector> vectors;  // by VectorId
-  double bound = 0;                 // of the spectrum of D^-1 A
+  LazyVectors vectors;
+  double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
 
   std::int32_t tiles() const { return static_cast<std::int32_t>(patched.tiles()); }
@@ -72,7 +115,7 @@ struct FastLevel {
   const std::uint8_t* fixed(std::size_t tile, int first) const {
     return patched.fixed.data() + kGroup * tile + first;
   }
-  S* at(int x) { return vectors[x].template in<S>().data(); }
+  S* at(int x) { return vectors[static_cast<std::size_t>(x)].template in<S>().data(); }
 
   /// D^-1 r of the vertices of a tile.
   Vec3<Pack<S>> times_inverse(std::size_t tile, int first, const Vec3<Pack<S>>& r) const {
@@ -94,15 +137,19 @@ class FastBackend final : public Backend {
   const char* instruction_set() const noexcept override { return kInstructionSet; }
   int threads() const noexcept override { return threads_; }
   std::size_t bytes() const override;
+  double bytes_per_cell() const noexcept override;
   void load(const Hierarchy& hierarchy) override;
   bool can_update() const noexcept override { return updates_; }
+  bool reads_incidences() const noexcept override { return false; }
   void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override {
     expects(options.chebyshev,
             "this backend smooths by Chebyshev; Gauss-Seidel needs the reference backend");
     smoother_ = options;
   }
-  int add_vector() override;
+  int add_vector() override { return append_vector(true); }
+  int add_rough_vector() override { return append_vector(kIsDouble); }
+  void release(int x) override;
 
   void set_operator(const OperatorScale& scale) override;
   void rotate_cells(int displacement) override;
@@ -166,8 +213,10 @@ class FastBackend final : public Backend {
   static constexpr std::size_t kWorthCells = 4096;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 
+  static constexpr bool kIsDouble = std::is_same_v<S, double>;
+
+  int append_vector(bool exact);
   void load_coarsest();
-  void allocate(FastVector& vector, const PatchedLevel& level, bool exact) const;
   void round_rotations();
   template <class T>
   const FinestValues<T>& values_of() const;
@@ -193,7 +242,7 @@ class FastBackend final : public Backend {
   void expects_exact(int in, int out) const {
     ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
   }
-  bool is_exact(int level, int x) const { return levels_[level].vectors[x].is_exact(); }
+  bool is_exact(int level, int x) const { return levels_[level].vectors.is_exact(x); }
   void changed(int level, int x) {
     if (x == kSolution) levels_[level].solution_is_zero = false;
   }
@@ -206,7 +255,7 @@ class FastBackend final : public Backend {
   FinestValues<double> exact_;  // of level 0
   FinestValues<S> single_;      // the same, rounded; empty if S is double
   std::vector<FastLevel<S>> levels_;
-  int vectors_on_finest_ = kLevelVectors;
+  std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
   std::vector<double> partial_;  // sums of shared vertices, by copy; of the scalars of the sweep
   int waiting_ = -1;             // level whose solution is still to be corrected
   std::vector<Vec3d> faces_;     // of the surface: area normals

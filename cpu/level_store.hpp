@@ -34,7 +34,7 @@ struct FinestStore {
   std::vector<Quaternion> rotation;  // per cell
   std::vector<MaterialConstants> materials;
   kernels::HexMass<double> mass;
-  const std::vector<CellValues>* values = nullptr;
+  const CellValueList* values = nullptr;
 };
 
 struct LevelStore {

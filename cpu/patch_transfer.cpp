@@ -80,8 +80,16 @@ std::size_t Transfer::bytes() const {
          of(giver_begin) + of(givers) + of(giver_rows.count);
 }
 
-TransferRows::TransferRows(const PatchedLevel& level, const Level& next)
-    : level_(level), next_(next), local_(next.point.size()) {
+FirstCells::FirstCells(const Level& level) : level_(level) {
+  if (!level.incidence_begin.empty()) return;
+  first_.assign(level.point.size(), -1);
+  for (std::int32_t c = 0; c < level.cells(); ++c)
+    for (std::size_t i = 0; i < 8; ++i)
+      if (std::int32_t& first = first_[level.slots[c][i]]; first < 0) first = 8 * c + size_of(i);
+}
+
+TransferRows::TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first)
+    : level_(level), next_(next), first_(first), local_(next.point.size()) {
   for (int place = 0; place <= kernels::kPassed; ++place)
     regular_[static_cast<std::size_t>(place)] = [&] {
       float w[8][8];
@@ -112,7 +120,7 @@ const TransferRows::Weights& TransferRows::weights(std::uint16_t child, int plac
 
 std::uint8_t TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
   const Level& level = *level_.level;
-  const std::int32_t first = level.incidences_of(vertex)[0];
+  const std::int32_t first = first_[vertex];
   const std::int32_t child = first / 8, parent = level.parent[child];
   const auto& w = weights(level.fold[child], level.place[child],
                           next_.fold[parent])[static_cast<std::size_t>(first % 8)];
@@ -142,8 +150,7 @@ TransferDraft TransferRows::operator()(std::int32_t n) {
   out.first_lead_term = size_of(out.term_point.size());
   for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
     const std::int32_t v = level_.vertex[level_.copy_vertex[k]];
-    const std::int32_t first = level_.level->incidences_of(v)[0];
-    if (level_.patch_of_cell(first / 8) != n) continue;
+    if (level_.patch_of_cell(first_[v] / 8) != n) continue;
     out.lead.push_back(level_.copy_vertex[k]);
     out.lead_terms.push_back(add_row(v, out));
   }
@@ -157,10 +164,11 @@ void place_transfers(const std::vector<std::int32_t>& patches, const Level& next
   Transfer& t = level.transfer;
   const bool anew = t.parts.empty();
   const auto count = size_of(patches.size());
+  const FirstCells first(*level.level);
   std::vector<TransferDraft> drafts(patches.size());
 #pragma omp parallel num_threads(threads) if (count > 1)
   {
-    TransferRows rows(level, next);
+    TransferRows rows(level, next, first);
 #pragma omp for schedule(dynamic, 1)
     for (std::int32_t i = 0; i < count; ++i) drafts[i] = rows(patches[i]);
   }

@@ -27,11 +27,25 @@ struct TransferDraft {
   std::vector<std::uint8_t> given_weight;
 };
 
+/// Of each vertex of a level its first cell, as in Level::incidences_of, which may be gone.
+class FirstCells {
+ public:
+  explicit FirstCells(const Level& level);
+  /// 8 cell + slot.
+  std::int32_t operator[](std::int32_t vertex) const {
+    return first_.empty() ? level_.incidences_of(vertex)[0] : first_[vertex];
+  }
+
+ private:
+  const Level& level_;
+  std::vector<std::int32_t> first_;
+};
+
 /// The rows of one patch after the other. A row is that of the first cell of the vertex; those of
 /// its other cells agree.
 class TransferRows {
  public:
-  TransferRows(const PatchedLevel& level, const Level& next);
+  TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first);
   TransferDraft operator()(std::int32_t patch);
 
  private:
@@ -42,6 +56,7 @@ class TransferRows {
 
   const PatchedLevel& level_;
   const Level& next_;
+  const FirstCells& first_;
   Marks local_;  // per vertex of the next level: its point, from 1
   std::array<Weights, 9> regular_;
   std::unordered_map<std::uint64_t, Weights> others_;

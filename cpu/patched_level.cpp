@@ -398,7 +398,8 @@ class Patcher {
     if (anew_) out_.groups_built = all, out_.tiles_built = out_.tiles();
   }
 
-  void write_cells(const Draft& draft) {
+  /// What is written is freed, since drafts together are as large as the level.
+  void write_cells(Draft& draft) {
     const Patch& patch = out_.patches[draft.patch];
     const std::int32_t first = patch.groups.first;
     put(draft.cells, kGroup * first, out_.cell);
@@ -413,6 +414,8 @@ class Patcher {
     }
     for (std::size_t k = 0; k < draft.cells.size(); ++k)
       if (draft.cells[k] >= 0) out_.lane[draft.cells[k]] = kGroup * first + size_of(k);
+    draft.corners = {};
+    draft.slots = {};
   }
 
   void write_points(const Draft& draft) {

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <unistd.h>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 #include <limits>
 
@@ -12,6 +15,14 @@ inline double physical_memory() {
   const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
   if (pages <= 0 || page <= 0) return std::numeric_limits<double>::infinity();
   return static_cast<double>(pages) * static_cast<double>(page);
+}
+
+/// What was freed goes back to the machine: after work that takes many small pieces, most of it
+/// would stay with the process.
+inline void return_freed_memory() {
+#if defined(__GLIBC__)
+  malloc_trim(0);
+#endif
 }
 
 }  // namespace kerf

@@ -146,7 +146,7 @@ LinkedOctree::LinkedOctree(const Voxels& voxels, int refinement)
           const Vec3i corner{r[0] << refinement, r[1] << refinement, r[2] << refinement};
           root_.push_back(-1);
           if (!pyramid.inside(corner, refinement)) continue;
-          root_.back() = append_node(corner, refinement, -1);
+          root_.back() = append_node(corner, refinement);
           build(voxels, pyramid, root_.back());
         }
   }
@@ -165,13 +165,12 @@ LinkedOctree::LinkedOctree(const Voxels& voxels, int refinement)
   number_leaves();
 }
 
-std::int32_t LinkedOctree::append_node(const Vec3i& corner, int size_log2, std::int32_t parent) {
+std::int32_t LinkedOctree::append_node(const Vec3i& corner, int size_log2) {
   if (nodes_.size() >= static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
     throw Error(ErrorKind::unavailable,
                 "the octree has more than 2^31 cells: lower the resolution");
   Node node;
   node.corner = corner;
-  node.parent = parent;
   node.size_log2 = static_cast<std::uint8_t>(size_log2);
   node.present = 1;
   nodes_.push_back(node);
@@ -186,7 +185,7 @@ std::int32_t LinkedOctree::append_children(std::int32_t node) {
   for (int i = 0; i < 8; ++i) {
     append_node({parent.corner[0] + ((i & 1) << k), parent.corner[1] + ((i >> 1 & 1) << k),
                  parent.corner[2] + ((i >> 2) << k)},
-                k, node);
+                k);
     nodes_.back().material = parent.material;
   }
   nodes_[static_cast<std::size_t>(node)].first_child = first;
@@ -250,10 +249,8 @@ void LinkedOctree::number_leaves() {
   if (!std::is_sorted(order.begin(), order.end())) std::sort(order.begin(), order.end());
 
   leaves_.reserve(order.size() + order.size() / 4);  // cuts append
-  leaf_number_.reserve(nodes_.size() + nodes_.size() / 4);
-  leaf_number_.assign(nodes_.size(), -1);
   for (const auto& entry : order) {
-    leaf_number_[static_cast<std::size_t>(entry.second)] =
+    nodes_[static_cast<std::size_t>(entry.second)].number =
         static_cast<std::int32_t>(leaves_.size());
     leaves_.push_back(entry.second);
   }
@@ -321,13 +318,12 @@ void LinkedOctree::split(std::int32_t leaf) {
   const std::int32_t first = append_children(leaf);
   leaf_count_ += 7;
   if (leaves_.empty()) return;
-  const std::int32_t number = std::exchange(leaf_number_[static_cast<std::size_t>(leaf)], -1);
+  const std::int32_t number = std::exchange(nodes_[static_cast<std::size_t>(leaf)].number, -1);
   splits_.push_back(number);
-  leaf_number_.resize(nodes_.size(), -1);
   leaves_[static_cast<std::size_t>(number)] = first;
-  leaf_number_[static_cast<std::size_t>(first)] = number;
+  nodes_[static_cast<std::size_t>(first)].number = number;
   for (std::int32_t child = first + 1; child < first + 8; ++child) {
-    leaf_number_[static_cast<std::size_t>(child)] = static_cast<std::int32_t>(leaves_.size());
+    nodes_[static_cast<std::size_t>(child)].number = static_cast<std::int32_t>(leaves_.size());
     leaves_.push_back(child);
   }
 }
@@ -390,9 +386,9 @@ bool LinkedOctree::disconnect(const Vec3i& c, int axis, const LinkCut& cut) {
 std::size_t LinkedOctree::bytes() const {
   // A hash map spends a node with a next pointer on each record, and a pointer on each bucket.
   const std::size_t record = sizeof(std::pair<const LinkKey, LinkCut>) + sizeof(void*);
-  return nodes_.capacity() * sizeof(Node) +
-         (root_.capacity() + leaves_.size() + leaf_number_.size() + splits_.capacity()) *
-             sizeof(std::int32_t) +
+  // Room at the end of an array that was never written takes no memory.
+  return nodes_.size() * sizeof(Node) +
+         (root_.size() + leaves_.size() + splits_.size()) * sizeof(std::int32_t) +
          records_.size() * record + records_.bucket_count() * sizeof(void*);
 }
 

@@ -30,8 +30,8 @@ class LinkedOctree {
  public:
   struct Node {
     Vec3i corner{};                 ///< low corner on the finest lattice
-    std::int32_t parent = -1;       ///< node, -1 for a root
     std::int32_t first_child = -1;  ///< eight consecutive nodes, -1 for a leaf
+    std::int32_t number = -1;       ///< place in leaves() of a present leaf, -1 for others
     std::uint8_t size_log2 = 0;     ///< side in finest cells: 1 << size_log2
     std::uint8_t present = 0;       ///< 0: holds no material (deleted), never a leaf of the body
     std::uint8_t material = 0;      ///< index of the material, of a present leaf
@@ -54,7 +54,7 @@ class LinkedOctree {
   std::size_t leaf_count() const { return leaf_count_; }
   /// The place in leaves() of a node that is a present leaf; -1 for others.
   std::int32_t leaf_number(std::int32_t node) const {
-    return leaf_number_[static_cast<std::size_t>(node)];
+    return nodes_[static_cast<std::size_t>(node)].number;
   }
   /// Appends the number of every present leaf that touches the box of finest cells [low, high].
   void add_leaves_between(const Vec3i& low, const Vec3i& high,
@@ -87,7 +87,7 @@ class LinkedOctree {
  private:
   class Pyramid;
 
-  std::int32_t append_node(const Vec3i& corner, int size_log2, std::int32_t parent);
+  std::int32_t append_node(const Vec3i& corner, int size_log2);
   std::int32_t append_children(std::int32_t node);
   void build(const Voxels& voxels, const Pyramid& pyramid, std::int32_t node);
   void disconnect_surface(const Voxels& voxels);
@@ -109,8 +109,7 @@ class LinkedOctree {
   std::vector<std::int32_t> root_;  // dense grid of root nodes, -1: none
   std::vector<Node> nodes_;
   std::unordered_map<LinkKey, LinkCut> records_;
-  std::vector<std::int32_t> leaves_;       // empty during construction
-  std::vector<std::int32_t> leaf_number_;  // per node
+  std::vector<std::int32_t> leaves_;  // empty during construction
   std::size_t leaf_count_ = 0;
   std::vector<std::int32_t> splits_;
 };

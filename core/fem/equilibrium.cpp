@@ -26,8 +26,8 @@ Equilibrium::Equilibrium(Backend& backend, LinearSolver& solver, const TimeSetup
       previous_u_(backend.add_vector()),
       previous_d_(backend.add_vector()),
       velocity_(backend.add_vector()),
-      work_(backend.add_vector()) {
-  for (int i = 0; i < 2 * kDepth; ++i) free_.push_back(backend_.add_vector());
+      work_(solver.spare()[0]) {
+  for (int i = 0; i < 2 * kDepth; ++i) free_.push_back(backend_.add_rough_vector());
 }
 
 double Equilibrium::residual() {
@@ -70,12 +70,14 @@ void Equilibrium::anderson_step(int depth) {
     free_.pop_back();
     dd_.push_back(free_.back());
     free_.pop_back();
-    backend_.copy(0, state_.displacement, du_.back());
-    backend_.add(0, -1, previous_u_, du_.back());
-    backend_.copy(0, increment_, dd_.back());
-    backend_.add(0, -1, previous_d_, dd_.back());
+    // The differences may be rounded, but not what they are taken of.
+    backend_.combine(0, 1, state_.displacement, -1, previous_u_);
+    backend_.copy(0, previous_u_, du_.back());
+    backend_.combine(0, 1, increment_, -1, previous_d_);
+    backend_.copy(0, previous_d_, dd_.back());
   }
   backend_.copy(0, state_.displacement, previous_u_);
+  if (best_at_ == state_.displacement) best_at_ = previous_u_;
   backend_.copy(0, increment_, previous_d_);
 
   const int m = static_cast<int>(dd_.size());
@@ -135,17 +137,22 @@ bool Equilibrium::pseudo_time(double natural_time) {
   return true;
 }
 
+// To where it stays while iterates go on. As long as each is better than the last there is no need.
+void Equilibrium::keep_best() {
+  if (best_at_ != best_) backend_.copy(0, best_at_, best_);
+  best_at_ = best_;
+}
+
+void Equilibrium::go_to_best() {
+  if (best_at_ != state_.displacement) backend_.copy(0, best_at_, state_.displacement);
+  stats_.residual = residual();
+}
+
 NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
   stats_ = {};
   keep_rotations_ = keep_rotations;
-  const auto forget = [&] {
-    for (auto* list : {&du_, &dd_}) {
-      free_.insert(free_.end(), list->begin(), list->end());
-      list->clear();
-    }
-  };
   forget();
-  backend_.copy(0, state_.displacement, best_);  // to come back to if the first update is lost
+  best_at_ = state_.displacement;  // to come back to if the first update is lost
   stats_.residual = residual();
   double best = std::numeric_limits<double>::infinity();
   int since_best = 0, depth = 0;
@@ -161,29 +168,42 @@ NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
       // Only a real gain counts as progress.
       since_best = stats_.residual < 0.9 * best ? 0 : since_best + 1;
       best = stats_.residual;
-      backend_.copy(0, state_.displacement, best_);
+      best_at_ = state_.displacement;
     } else {
       ++since_best;
+      keep_best();
     }
     // Large loads: the first iterates may be far worse than the start without harm.
     constexpr int kPatience = 15;
     const bool lost = !std::isfinite(stats_.residual) || stats_.residual > 1e3 * best;
     if (!lost && since_best < kPatience) continue;
-    backend_.copy(0, best_, state_.displacement);
-    stats_.residual = residual();
+    go_to_best();
+    keep_best();
     if (!pseudo_time(natural_time)) break;
     forget();
     depth = 0;
     since_best = 0;
     best = stats_.residual;
-    backend_.copy(0, state_.displacement, best_);
+    best_at_ = state_.displacement;
   }
-  if (!(stats_.residual <= best)) {  // end on the best iterate, never on a NaN
-    backend_.copy(0, best_, state_.displacement);
-    stats_.residual = residual();
-  }
+  if (!(stats_.residual <= best)) go_to_best();  // never end on a NaN
   stats_.converged = finished();
   return stats_;
+}
+
+void Equilibrium::release() {
+  forget();
+  for (const int x : {right_, increment_, best_, previous_u_, previous_d_, velocity_})
+    backend_.release(x);
+  solver_.release();
+}
+
+void Equilibrium::forget() {
+  for (auto* list : {&du_, &dd_}) {
+    for (const int x : *list) backend_.release(x);
+    free_.insert(free_.end(), list->begin(), list->end());
+    list->clear();
+  }
 }
 
 }  // namespace kerf

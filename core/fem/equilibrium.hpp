@@ -29,6 +29,8 @@ class Equilibrium {
   /// `keep_rotations`: the first update takes the rotations as they are, so that prescribed
   /// displacements spread over the body before any rotation is extracted.
   NonlinearStats solve(double natural_time, bool keep_rotations);
+  /// Gives the memory of vectors that hold nothing between solves back until the next one.
+  void release();
   void on_progress(Progress progress) { progress_ = std::move(progress); }
 
  private:
@@ -36,6 +38,9 @@ class Equilibrium {
   double update(double mass_factor);
   void anderson_step(int depth);
   bool pseudo_time(double natural_time);
+  void keep_best();
+  void go_to_best();
+  void forget();  // the history
   bool finished() const { return stats_.residual <= time_.nonlinear_tolerance; }
 
   Backend& backend_;
@@ -44,6 +49,7 @@ class Equilibrium {
   SolverSetup setup_;
   StateVectors state_;
   int right_, increment_, best_, previous_u_, previous_d_, velocity_, work_;
+  int best_at_ = -1;          // the vector that holds the best iterate
   std::vector<int> du_, dd_;  // differences of iterates and of increments, newest last
   std::vector<int> free_;     // vectors to store them in
   bool keep_rotations_ = false;

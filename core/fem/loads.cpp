@@ -52,20 +52,25 @@ Vec3d away_from_axis(const RadialForce& load, const Vec3d& p) {
 }  // namespace
 
 void apply_supports(const Lattice& lattice, const std::vector<Support>& supports, Level& level,
-                    std::int32_t first, std::vector<double>& held) {
-  held.resize(3 * level.point.size());
+                    std::int32_t first, std::vector<HeldComponent>& held) {
+  while (!held.empty() && held.back().component >= 3 * static_cast<std::size_t>(first))
+    held.pop_back();
   for (std::int32_t v = first; v < level.vertices(); ++v) {
     level.fixed[v] = 0;
-    for (int c = 0; c < 3; ++c) held[3 * static_cast<std::size_t>(v) + c] = 0;
+    Vec3d displacement{};
     const Vec3d p = lattice.point(level.point[v]);
     for (const Support& support : supports) {
       if (!support.box.contains(p)) continue;
       for (int c = 0; c < 3; ++c)
         if (support.held[c]) {
           level.fixed[v] = static_cast<std::uint8_t>(level.fixed[v] | (1 << c));
-          held[3 * static_cast<std::size_t>(v) + c] = support.displacement[c];
+          displacement[c] = support.displacement[c];
         }
     }
+    for (int c = 0; c < 3; ++c)
+      if (displacement[c] != 0)
+        held.push_back(
+            {3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(c), displacement[c]});
   }
 }
 

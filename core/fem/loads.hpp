@@ -3,6 +3,7 @@
 // Supports and loads on the vertices of level 0.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,11 +13,16 @@
 
 namespace kerf {
 
-/// Sets level.fixed from the supports (later ones win) for the vertices from `first` on, and puts
-/// their held displacement, 3 per vertex, m, zero in free components, behind what `held` has of the
-/// vertices before.
+/// A component of a vertex that is held elsewhere than at zero.
+struct HeldComponent {
+  std::size_t component = 0;  ///< 3 vertex + axis
+  double displacement = 0;    ///< m
+};
+
+/// Sets level.fixed from the supports (later ones win) for the vertices from `first` on. `held`,
+/// ascending, keeps what it has of the vertices before.
 void apply_supports(const Lattice& lattice, const std::vector<Support>& supports, Level& level,
-                    std::int32_t first, std::vector<double>& held);
+                    std::int32_t first, std::vector<HeldComponent>& held);
 
 /// External forces on the vertices, N. Reference state; hanging corners pass their share to their
 /// masters.

@@ -22,8 +22,8 @@ Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
       acceleration_(time.scheme == TimeScheme::newmark ? state.memory : backend.add_vector()),
       right_(backend.add_vector()),
       increment_(backend.add_vector()),
-      work_(backend.add_vector()),
-      scratch_(backend.add_vector()) {}
+      work_(solver.spare()[0]),
+      scratch_(solver.spare()[1]) {}
 
 double Motion::velocity_factor() const {
   return time_.scheme == TimeScheme::newmark ? kGamma / (kBeta * time_.step) : 0.5 / time_.step;

@@ -234,6 +234,18 @@ void Hierarchy::pack() {
   for (Level& level : levels) level.pack();
 }
 
+void Hierarchy::forget_neighbours() {
+  for (Level& level : levels) {
+    level.link_begin = {};
+    level.linked = {};
+    level.link_rows = {};
+    if (&level == &levels.back()) break;
+    level.incidence_begin = {};
+    level.incidence = {};
+    level.incidence_rows = {};
+  }
+}
+
 std::vector<CellLink> links_of(const Level& level) {
   std::vector<CellLink> out;
   for (std::int32_t a = 0; a < level.cells(); ++a)
@@ -250,8 +262,20 @@ std::size_t Level::bytes() const {
          bytes_of(child_rows.count) + bytes_of(incidence_rows.count);
 }
 
+std::uint16_t CellValueList::kind_of(const CellValues& values) {
+  if (last_ < kinds_.size() && kinds_[last_] == values) return last_;
+  const auto found = std::find(kinds_.begin(), kinds_.end(), values);
+  last_ = static_cast<std::uint16_t>(found - kinds_.begin());
+  if (found != kinds_.end()) return last_;
+  expects(kinds_.size() < 65535, "the body has more than 65535 kinds of cells");
+  kinds_.push_back(values);
+  return last_;
+}
+
+std::size_t CellValueList::bytes() const { return bytes_of(kind_) + bytes_of(kinds_); }
+
 std::size_t Hierarchy::bytes() const {
-  std::size_t sum = bytes_of(values);
+  std::size_t sum = values.bytes();
   for (const Level& level : levels) sum += level.bytes();
   return sum;
 }

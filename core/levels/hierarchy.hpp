@@ -13,6 +13,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -43,7 +44,7 @@ struct Level {
   std::vector<std::uint8_t> fixed;  ///< bit c: component c is held
 
   // Lists, to be read by the functions below: these arrays lie packed only after a build and
-  // pack().
+  // pack(). Those of links and incidences are empty after Hierarchy::forget_neighbours.
   std::vector<std::int32_t> link_begin, linked;
   std::vector<std::int32_t> child_begin, children;  ///< empty on level 0
   std::vector<std::int32_t> incidence_begin, incidence;
@@ -83,6 +84,30 @@ struct CellValues {
   double stiffness = 0;       ///< E * side, N/m
   double mass = 0;            ///< density * side^3, kg
   std::uint8_t material = 0;  ///< index into Hierarchy::poisson
+
+  friend bool operator==(const CellValues&, const CellValues&) = default;
+};
+
+/// One for each cell. Few are different, so that a cell costs two bytes.
+class CellValueList {
+ public:
+  const CellValues& operator[](std::size_t cell) const { return kinds_[kind_[cell]]; }
+  std::size_t size() const { return kind_.size(); }
+  void reserve(std::size_t size) { kind_.reserve(size); }
+  void clear() { resize(0); }
+  void push_back(const CellValues& values) { kind_.push_back(kind_of(values)); }
+  void resize(std::size_t size, const CellValues& values = {}) {
+    kind_.resize(size, kind_of(values));
+  }
+  void set(std::size_t cell, const CellValues& values) { kind_[cell] = kind_of(values); }
+  std::size_t bytes() const;
+
+ private:
+  std::uint16_t kind_of(const CellValues& values);
+
+  std::vector<std::uint16_t> kind_;
+  std::vector<CellValues> kinds_;
+  std::uint16_t last_ = 0;  // mostly the next one too
 };
 
 struct HierarchyOptions {
@@ -94,12 +119,15 @@ struct HierarchyOptions {
 struct Hierarchy {
   double spacing = 0;  ///< side of a finest cell, m
   std::vector<Level> levels;
-  std::vector<CellValues> values;  ///< cells of level 0
-  std::vector<double> poisson;     ///< Poisson ratio of each material
+  CellValueList values;         ///< cells of level 0
+  std::vector<double> poisson;  ///< Poisson ratio of each material
   bool lumped_mass = false;
   bool cut = false;  ///< some link between two cells is disconnected
 
   void pack();  ///< all levels
+  /// Gives back what blades, and some backends, ask for alone: links, and incidences of all levels
+  /// but the coarsest. The hierarchy cannot be updated then.
+  void forget_neighbours();
   std::size_t bytes() const;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "core/solve/linear_solver.hpp"
 
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -11,16 +10,19 @@
 namespace kerf {
 
 LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
-    : backend_(backend), setup_(setup) {
+    : backend_(backend),
+      setup_(setup),
+      residual_(backend.add_vector()),
+      direction_(backend.add_vector()),
+      product_(backend.add_vector()) {
   SmootherOptions smoother;
   smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
   smoother.omega = setup.omega;
   backend_.set_smoother(smoother);
-  residual_ = backend_.add_vector();
-  if (setup.method == SolverMethod::cg || setup.method == SolverMethod::cg_jacobi) {
-    direction_ = backend_.add_vector();
-    product_ = backend_.add_vector();
-  }
+}
+
+void LinearSolver::release() {
+  for (const int x : {residual_, direction_, product_}) backend_.release(x);
 }
 
 void LinearSolver::set_structure(const Hierarchy& hierarchy) {

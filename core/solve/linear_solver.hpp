@@ -3,6 +3,7 @@
 // Solves A x = b on level 0 by the method that the setup names.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -43,6 +44,11 @@ class LinearSolver {
   /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
   SolveStats solve(int b, int x, double tolerance, double reference = 0);
 
+  /// Vectors of level 0 that hold nothing between solves, for others to use.
+  std::array<int, 2> spare() const { return {direction_, product_}; }
+  /// Gives the memory of these, and of another, back until the next solve.
+  void release();
+
   CycleType cycle_in_use() const { return cycle_type_; }
   const SolverTimes& times() const { return times_; }
   /// How often the coarsest level was factored.
@@ -66,8 +72,8 @@ class LinearSolver {
   std::unique_ptr<Cycle> cycle_;
   std::unique_ptr<AssembledLevel> assembled_;
   std::unique_ptr<SparseCholesky> cholesky_;
-  int residual_ = -1;                  // the true one, or the recursion of conjugate gradients
-  int direction_ = -1, product_ = -1;  // of conjugate gradients
+  int residual_;             // the true one, or the recursion of conjugate gradients
+  int direction_, product_;  // of conjugate gradients
   bool factor_due_ = true;
   int factors_ = 0;
   double decades_with_new_ = 0;  // a cycle, of the first solve after it

@@ -116,7 +116,7 @@ double lowest_after_load_steps(const Beam& beam, int steps) {
   LinkedOctree body(voxelise(*setup.body.solid, lattice), 0);
   cut(body, {}, sweep(beam.notch()), 1);
   Hierarchy hierarchy = test::one_material(body, setup.material);
-  std::vector<double> held;
+  std::vector<HeldComponent> held;
   apply_supports(lattice, setup.supports, hierarchy.levels[0], 0, held);
   build_coarse_levels(hierarchy, {});
   const std::vector<double> load =

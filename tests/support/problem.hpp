@@ -107,7 +107,7 @@ struct Problem {
     };
     for (std::int32_t c = change.cells_before; c < finest.cells(); ++c)
       hierarchy.values.push_back(value_of(change.origin[c - change.cells_before], c));
-    for (const std::int32_t c : change.cells) hierarchy.values[c] = value_of(c, c);
+    for (const std::int32_t c : change.cells) hierarchy.values.set(c, value_of(c, c));
     for (std::int32_t v = change.vertices_before; v < finest.vertices(); ++v)
       finest.fixed[v] = options.holds != Holds::none && finest.point[v][0] == 0 ? 7 : 0;
     return updater.update_coarse(
