@@ -27,6 +27,19 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
   return dot(0, r, r);
 }
 
+bool Backend::advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state) {
+  const auto [rho, overlap] = state.first ? std::array{dot(0, z, r), 0.0} : dots(z, r, q);
+  if (!(rho > 0)) return false;
+  const double beta = state.first ? 0 : -state.alpha * overlap / state.rho;
+  state.first = false;
+  const auto [curvature, slope] = advance_direction(z, beta, d, q, r);
+  if (!(curvature > 0)) return false;
+  state.rho = rho;
+  state.alpha = slope / curvature;
+  state.residual2 = advance_solution(state.alpha, d, q, x, r);
+  return true;
+}
+
 void Backend::update(const Hierarchy&, const HierarchyChange&) { ensures(false, kNoUpdates); }
 
 void Backend::write_some(int, int, std::span<const std::int32_t>, std::span<const double>) {

@@ -46,6 +46,15 @@ struct SmootherOptions {
   double smallest = 1.0 / 8;  ///< Chebyshev: lower end of the range, relative to the upper
 };
 
+/// What a step of conjugate gradients leaves to the next one.
+struct ConjugateState {
+  double rho = 0, alpha = 0;  ///< r.z and the length of the step
+  double residual2 = 0;       ///< r.r after the step
+  bool first = true;
+};
+
+struct CycleOptions;  // core/solve/cycle.hpp
+
 /// Holds one simulation's matrices and vectors and runs the loops over them.
 /// Not thread-safe. A call may return early; the next call on the same object sees its result.
 /// Fixed components take no part: operators read them as zero and leave zero in them.
@@ -93,6 +102,9 @@ class Backend {
   virtual void solve_coarsest() = 0;                   ///< u from f
   virtual void apply(int level, int in, int out) = 0;  ///< out = A in
   virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
+  /// A whole cycle on level 0, where a backend has one of its own; else false, and the caller runs
+  /// the operations above.
+  virtual bool run_cycle(const CycleOptions&) { return false; }
 
   // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here
   // said with the operations above.
@@ -102,6 +114,9 @@ class Backend {
   virtual std::array<double, 2> advance_direction(int z, double beta, int d, int q, int r);
   /// x += a d and r -= a q; returns r.r.
   virtual double advance_solution(double a, int d, int q, int x, int r);
+  /// A whole step behind z = B r, flexible: beta from the change of the residual (Polak, Ribiere).
+  /// Returns false where r is zero or rounding has won; x and r are then as before.
+  virtual bool advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state);
 
   // Forces, level 0.
   /// out = sum over cells of [R] K ([R]^T (x + u) - x); held components too (reactions).
