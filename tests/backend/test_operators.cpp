@@ -79,6 +79,12 @@ INSTANTIATE_TEST_SUITE_P(Backends, Operators,
                                                               "half_cut", "crossed", "limbs")),
                          name_of);
 
+INSTANTIATE_TEST_SUITE_P(Mirror, Operators,
+                         ::testing::Combine(::testing::Values("mirror"),
+                                            ::testing::Values("one_cell", "floating", "bar",
+                                                              "half_cut", "crossed")),
+                         name_of);
+
 TEST_P(Operators, RotationsAreThoseOfTheSingularValues) {
   const Problem p(scene());
   const Loaded loaded = load(p);

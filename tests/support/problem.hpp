@@ -13,16 +13,20 @@
 #include "cpu/cpu_backend.hpp"
 #include "cpu/fast_backend.hpp"
 #include "tests/oracle/system_oracle.hpp"
+#include "tests/support/mirror_backend.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kerf::test {
 
-/// "cpu": the reference backend. Null for a backend that was not built.
+/// "cpu": the reference backend; "mirror": that of a device, on the host. Null for a backend that
+/// was not built.
 inline std::unique_ptr<Backend> make_backend(const std::string& name, int threads = 1,
                                              int tile_log2 = 0) {
   if (name == "cpu") return make_cpu_backend({threads, tile_log2});
   if (name == "fast") return make_fast_backend({threads, false});
   if (name == "mixed") return make_fast_backend({threads, true});
+  if (name == "mirror") return make_mirror_backend(false);
+  if (name == "mirror_mixed") return make_mirror_backend(true);
   return nullptr;
 }
 

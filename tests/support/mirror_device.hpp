@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+//
+// A device that is the host: memory of its own, filled with what is no number while it is fresh and
+// after it is freed, and loops over the same bodies that threads of a GPU run. So all that a device
+// backend does but the launches themselves is tested where there is no GPU: loads, stale data,
+// copies of parts, recorded cycles, and, by the order of the threads, races.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <type_traits>
+#include <vector>
+
+#include "core/base/error.hpp"
+#include "gpu/device_array.hpp"
+
+namespace kerf::test {
+
+/// In which order a launch runs its threads: a body that depends on it has a race.
+enum class ThreadOrder { rising, falling, strided };
+
+struct MirrorOptions {
+  ThreadOrder order = ThreadOrder::rising;
+  std::size_t memory = std::size_t{1} << 34;  ///< bytes; beyond, allocations fail
+};
+
+class MirrorDevice {
+ public:
+  static constexpr const char* kName = "mirror";
+  struct Graph {
+    std::vector<std::function<void()>> launches;
+  };
+
+  explicit MirrorDevice(const MirrorOptions& options = {}) : options_(options) {}
+  ~MirrorDevice();
+  MirrorDevice(const MirrorDevice&) = delete;
+  MirrorDevice& operator=(const MirrorDevice&) = delete;
+
+  void* allocate(std::size_t bytes);
+  void release(void* at, std::size_t bytes) noexcept;
+  void upload(void* to, const void* from, std::size_t bytes);
+  void download(void* to, const void* from, std::size_t bytes);
+  void copy(void* to, const void* from, std::size_t bytes);
+
+  template <class Body>
+  void launch(std::int32_t count, const Body& body) {
+    static_assert(std::is_trivially_copyable_v<Body>, "a body is copied to the device as it is");
+    ensures(count >= 0, "a launch of less than no threads");
+    if (count == 0) return;
+    submit([this, count, body] { each(count, body); });
+  }
+  template <class Body>
+  void launch_grid(std::int32_t, const Body& body) {
+    static_assert(std::is_trivially_copyable_v<Body>, "a body is copied to the device as it is");
+    submit([this, body] { body(*this); });
+  }
+  /// A grid is the device itself: all threads of an `each` are done before the next.
+  template <class Body>
+  void each(std::int32_t count, const Body& body) const {
+    constexpr std::int32_t kStride = 7;
+    if (options_.order == ThreadOrder::rising) {
+      for (std::int32_t i = 0; i < count; ++i) body(i);
+    } else if (options_.order == ThreadOrder::falling) {
+      for (std::int32_t i = count - 1; i >= 0; --i) body(i);
+    } else {
+      for (std::int32_t first = 0; first < std::min(count, kStride); ++first)
+        for (std::int32_t i = first; i < count; i += kStride) body(i);
+    }
+  }
+
+  void begin_recording();
+  Graph end_recording();
+  void replay(const Graph& graph);
+
+  gpu::DeviceCounters& counters() { return counters_; }
+
+ private:
+  void submit(std::function<void()> launch);
+  void expect_inside(const void* at, std::size_t bytes) const;
+
+  MirrorOptions options_;
+  gpu::DeviceCounters counters_;
+  std::map<void*, std::size_t> held_;
+  bool recording_ = false;
+  Graph recorded_;
+};
+
+}  // namespace kerf::test
