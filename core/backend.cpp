@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "core/backend.hpp"
 
+#include <vector>
+
 #include "core/base/error.hpp"
+#include "kernels/noise.hpp"
 
 namespace kerf {
 namespace {
@@ -25,6 +28,12 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
   add(0, a, d, x);
   add(0, -a, q, r);
   return dot(0, r, r);
+}
+
+void Backend::write_noise(int level, int x, std::size_t size) {
+  std::vector<double> values(size);
+  for (std::size_t i = 0; i < size; ++i) values[i] = kernels::noise(i);
+  write(level, x, values);
 }
 
 bool Backend::advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state) {

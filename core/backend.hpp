@@ -53,6 +53,13 @@ struct ConjugateState {
   bool first = true;
 };
 
+/// What a device was asked for since the backend was made; zero where there is none.
+struct DeviceWork {
+  std::size_t calls = 0;     ///< of the host: launches, and graphs of launches
+  std::size_t launches = 0;  ///< those in graphs too
+  std::size_t bytes_up = 0, bytes_down = 0;
+};
+
 struct CycleOptions;  // core/solve/cycle.hpp
 
 /// Holds one simulation's matrices and vectors and runs the loops over them.
@@ -65,6 +72,8 @@ class Backend {
   virtual const char* name() const noexcept = 0;  ///< "cpu" or "cuda"
   virtual int threads() const noexcept = 0;
   virtual std::size_t bytes() const = 0;
+  virtual void wait() const {}  ///< until all that was asked for is done
+  virtual DeviceWork device_work() const { return {}; }
 
   // Structure.
   /// Topology; again after each cut. Vectors and rotations are then zero and identity.
@@ -142,6 +151,8 @@ class Backend {
   virtual void mask(int level, int x) = 0;  ///< zero in fixed components
   virtual void write(int level, int x, std::span<const double> values) = 0;
   virtual void read(int level, int x, std::span<double> values) const = 0;
+  /// kernels/noise.hpp, of all `size` components of the level.
+  virtual void write_noise(int level, int x, std::size_t size);
 
   // Updates: what a cut costs follows what it touched.
   /// The hierarchy that was loaded has changed in place, where `change` tells. Vectors keep what

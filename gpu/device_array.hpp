@@ -10,11 +10,14 @@
 //   void download(to, from, bytes)   to the host; waits for all that was asked for before
 //   void copy(to, from, bytes)       on the device
 //   void launch(count, body)         body(i) for i in [0, count), in any order or at once
-//   void launch_grid(count, body)    body(grid): grid.each(n, f) runs f(i) for i in [0, n) and
-//                                    waits; `count` is the largest n
+//   void launch_program<List>(entries, n, count)
+//                                    the launches of bodies/program.hpp one after the other, in
+//                                    one; `count` is the largest of them
 //   void begin_recording()           from here on launches are noted down and do not run
 //   Graph end_recording()
+//   void abandon_recording() noexcept   after an error between the two
 //   void replay(graph)               all noted launches in their order
+//   void wait() const                all that was asked for is done
 //   DeviceCounters& counters()
 //
 // All but download return early. What is asked for runs in its order. While it records, a device
@@ -33,7 +36,8 @@ namespace kerf::gpu {
 
 /// What went on, since the device was made.
 struct DeviceCounters {
-  std::size_t launches = 0;    ///< alone; those in a graph count in `replays` alone
+  std::size_t calls = 0;       ///< launches that are not in a graph, and replays
+  std::size_t launches = 0;    ///< all, in graphs too
   std::size_t replays = 0;     ///< of graphs
   std::size_t recordings = 0;  ///< of graphs
   std::size_t downloads = 0;   ///< each waits for the device

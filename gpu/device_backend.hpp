@@ -23,6 +23,7 @@
 #include "core/solve/cycle.hpp"
 #include "gpu/bodies/dense.hpp"
 #include "gpu/bodies/products.hpp"
+#include "gpu/bodies/program.hpp"
 #include "gpu/bodies/surface.hpp"
 #include "gpu/bodies/values.hpp"
 #include "gpu/bodies/vectors.hpp"
@@ -90,15 +91,18 @@ class SyncedArray {
 template <class Device, class S>
 class DeviceBackend final : public Backend {
  public:
-  explicit DeviceBackend(std::unique_ptr<Device> device);
+  /// updates false: loads anew after each cut, for comparison.
+  explicit DeviceBackend(std::unique_ptr<Device> device, bool updates = true);
 
   const char* name() const noexcept override { return Device::kName; }
   int threads() const noexcept override { return 1; }  // of the host
   std::size_t bytes() const override { return device_->counters().bytes_held; }
+  void wait() const override { device_->wait(); }
+  DeviceWork device_work() const override;
   Device& device() const { return *device_; }
 
   void load(const Hierarchy& hierarchy) override;
-  bool can_update() const noexcept override { return true; }
+  bool can_update() const noexcept override { return updates_; }
   void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override;
   int add_vector() override;
@@ -141,6 +145,7 @@ class DeviceBackend final : public Backend {
   void mask(int level, int x) override;
   void write(int level, int x, std::span<const double> values) override;
   void read(int level, int x, std::span<double> values) const override;
+  void write_noise(int level, int x, std::size_t size) override;
   void write_some(int level, int x, std::span<const std::int32_t> vertices,
                   std::span<const double> values) override;
   void read_some(int level, int x, std::span<const std::int32_t> vertices,
@@ -172,7 +177,13 @@ class DeviceBackend final : public Backend {
   /// All launches pass here.
   template <class Body>
   void run(std::int32_t count, const Body& body) const {
-    device_->launch(count, body);
+    if (program_ == nullptr) {
+      device_->launch(count, body);
+    } else if constexpr (CycleBodies<S>::template index_of<Body>() >= 0) {
+      program_->push_back(program_entry<CycleBodies<S>>(count, body));
+    } else {
+      ensures(false, "a cycle launches what CycleBodies does not list");
+    }
   }
 
   // device_values.hpp
@@ -195,6 +206,7 @@ class DeviceBackend final : public Backend {
   void chebyshev(int level);
   void colour_level(int level);
   void gauss_seidel(int level, SweepOrder order);
+  void write_program(const CycleOptions& options);
   void descend(int level, const CycleOptions& options);
   void solve_coarse(int level, const CycleOptions& options);
   void krylov_step(int level, const CycleOptions& options);
@@ -208,6 +220,7 @@ class DeviceBackend final : public Backend {
   std::array<double, sums> read_sums() const;
 
   std::unique_ptr<Device> device_;  // first: what follows gives its memory back to it
+  bool updates_;
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   OperatorScale scale_;
@@ -231,6 +244,12 @@ class DeviceBackend final : public Backend {
     typename Device::Graph graph;
   };
   std::optional<RecordedCycle> cycle_;  // until structure or smoother change
+  // The levels from small_level_ on, in one launch of the cycle that is recorded; -1: none.
+  static constexpr std::int32_t kSmallCells = 4096;
+  int small_level_ = -1;
+  DeviceArray<Device, ProgramEntry> entries_;
+  std::int32_t most_threads_ = 0;                 // of an entry
+  std::vector<ProgramEntry>* program_ = nullptr;  // while it is written
 
   SyncedArray<Device, SurfacePoint> points_;
   SyncedArray<Device, std::int32_t> corners_, first_corner_, next_corner_, normal_of_;

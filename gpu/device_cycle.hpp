@@ -6,7 +6,9 @@
 // the operator) are read from the device by those who need them.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "gpu/device_backend.hpp"
 
@@ -186,13 +188,38 @@ bool DeviceBackend<Device, S>::run_cycle(const CycleOptions& options) {
     // Memory that it needs is there before: nothing is allocated while it is recorded.
     if (!smoother_.chebyshev)
       for (int l = 0; l < last_level(); ++l) colour_level(l);
+    write_program(options);
     device_->begin_recording();
-    descend(0, options);
+    try {
+      descend(0, options);
+    } catch (...) {
+      device_->abandon_recording();
+      throw;
+    }
     cycle_ = RecordedCycle{options, from_zero, device_->end_recording()};
   }
   device_->replay(cycle_->graph);
   for (DeviceLevel<Device, S>& level : levels_) level.solution_is_zero = false;
   return true;
+}
+
+/// What solve_coarse does from the first level on that cannot fill a device. Its solution is zero
+/// there whenever it is called.
+template <class Device, class S>
+void DeviceBackend<Device, S>::write_program(const CycleOptions& options) {
+  small_level_ = -1;
+  int level = 1;
+  while (level < last_level() && level_at(level).cells() > kSmallCells) ++level;
+  if (level >= last_level()) return;  // the coarsest alone is two launches
+  std::vector<ProgramEntry> entries;
+  level_at(level).solution_is_zero = true;
+  program_ = &entries;
+  solve_coarse(level, options);
+  program_ = nullptr;
+  most_threads_ = 0;
+  for (const ProgramEntry& entry : entries) most_threads_ = std::max(most_threads_, entry.count);
+  entries_.upload(entries);
+  small_level_ = level;
 }
 
 template <class Device, class S>
@@ -212,6 +239,12 @@ void DeviceBackend<Device, S>::descend(int level, const CycleOptions& options) {
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::solve_coarse(int level, const CycleOptions& options) {
+  if (level == small_level_) {
+    device_->template launch_program<CycleBodies<S>>(
+        entries_.data(), static_cast<std::int32_t>(entries_.size()), most_threads_);
+    level_at(level).solution_is_zero = false;
+    return;
+  }
   if (level == last_level() || options.type == CycleType::v) {
     descend(level, options);
   } else if (options.type == CycleType::w) {

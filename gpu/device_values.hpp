@@ -15,8 +15,9 @@
 namespace kerf::gpu {
 
 template <class Device, class S>
-DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device)
+DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device, bool updates)
     : device_(std::move(device)),
+      updates_(updates),
       exact_(*device_),
       single_(*device_),
       scales_(*device_),
@@ -29,6 +30,7 @@ DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device)
       staging_(*device_),
       other_staging_(*device_),
       values_(*device_),
+      entries_(*device_),
       points_(*device_),
       corners_(*device_),
       first_corner_(*device_),

@@ -13,6 +13,12 @@
 
 namespace kerf::gpu {
 
+template <class Device, class S>
+DeviceWork DeviceBackend<Device, S>::device_work() const {
+  const DeviceCounters& c = device_->counters();
+  return {c.calls, c.launches, c.bytes_up, c.bytes_down};
+}
+
 /// body(from, to) with the types that two vectors have.
 template <class Device, class S>
 template <class Body>
@@ -149,6 +155,14 @@ void DeviceBackend<Device, S>::read(int level, int x, std::span<double> values) 
     vector.single.read(0, rounded);
     std::copy(rounded.begin(), rounded.end(), values.begin());
   }
+}
+
+template <class Device, class S>
+void DeviceBackend<Device, S>::write_noise(int level, int x, std::size_t size) {
+  vector_at(level, x).with([&](auto* to) {
+    run(static_cast<std::int32_t>(size), NoiseBody<std::decay_t<decltype(*to)>>{to});
+  });
+  changed(level, x);
 }
 
 template <class Device, class S>

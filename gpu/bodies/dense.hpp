@@ -63,24 +63,27 @@ struct InvertBlock {
   double* failed;
 
   KERF_HD void operator()(std::int32_t) const {
+    double block[kBlock][kBlock];  // near the thread, which reads it some thousand times
     for (int i = 0; i < rows; ++i)
-      for (int j = 0; j < rows; ++j) P[i * kBlock + j] = A[entry(first + i, first + j)];
+      for (int j = 0; j < rows; ++j) block[i][j] = A[entry(first + i, first + j)];
     for (int k = 0; k < rows; ++k) {
-      const double left = P[k * kBlock + k];
+      const double left = block[k][k];
       const bool is_pivot = left > kSingular * diagonal[first + k];
       if (!is_pivot) *failed = 1;
       const double pivot = is_pivot ? 1 / left : 0;
       for (int j = 0; j < rows; ++j)
-        if (j != k) P[k * kBlock + j] *= pivot;
+        if (j != k) block[k][j] *= pivot;
       for (int i = 0; i < rows; ++i) {
         if (i == k) continue;
-        const double factor = P[i * kBlock + k];
+        const double factor = block[i][k];
         for (int j = 0; j < rows; ++j)
-          if (j != k) P[i * kBlock + j] = fma(-factor, P[k * kBlock + j], P[i * kBlock + j]);
-        P[i * kBlock + k] = -factor * pivot;
+          if (j != k) block[i][j] = fma(-factor, block[k][j], block[i][j]);
+        block[i][k] = -factor * pivot;
       }
-      P[k * kBlock + k] = pivot;
+      block[k][k] = pivot;
     }
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < rows; ++j) P[i * kBlock + j] = block[i][j];
   }
 
  private:

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "gpu/level_view.hpp"
+#include "kernels/noise.hpp"
 
 namespace kerf::gpu {
 
@@ -47,6 +48,15 @@ struct CombineBody {
     const To p = static_cast<To>(a.get()), q = static_cast<To>(b.get());
     const To first = p * static_cast<To>(x[i]);
     y[i] = q == To(0) ? first : first + q * y[i];
+  }
+};
+
+template <class T>
+struct NoiseBody {
+  T* x;
+
+  KERF_HD void operator()(std::int32_t i) const {
+    x[i] = static_cast<T>(kernels::noise(static_cast<std::uint64_t>(i)));
   }
 };
 

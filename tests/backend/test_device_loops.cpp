@@ -11,6 +11,7 @@
 #include "gpu/bodies/dense.hpp"
 #include "gpu/bodies/vectors.hpp"
 #include "gpu/device_array.hpp"
+#include "gpu/device_ceilings.hpp"
 #include "tests/support/mirror_device.hpp"
 
 namespace kerf {
@@ -102,7 +103,8 @@ TEST(MirrorDevice, RecordedLaunchesRunWhenTheyAreReplayed) {
   device.replay(graph);
 
   EXPECT_EQ(read(y), (std::vector<double>{14, 28}));
-  EXPECT_EQ(device.counters().launches, 0u);
+  EXPECT_EQ(device.counters().launches, 2u);
+  EXPECT_EQ(device.counters().calls, 2u);
   EXPECT_EQ(device.counters().replays, 2u);
 }
 
@@ -162,6 +164,18 @@ TEST(Vectors, NothingIsReadWhereTheFactorIsZero) {
   EXPECT_EQ(u[0], 5);
   EXPECT_EQ(r[0], 2);
   EXPECT_EQ(sum[0], 4);
+}
+
+TEST(Ceilings, AreMeasuredOnAnyDevice) {
+  MirrorDevice device;
+  const CudaCeilings found = gpu::measure_ceilings(device, 64, 8, 4);
+  EXPECT_EQ(found.elements, 64);
+  EXPECT_EQ(found.multiply_adds, 8 * 4 * 8);
+  for (const double seconds : {found.triad_seconds, found.float_seconds, found.double_seconds}) {
+    EXPECT_GT(seconds, 0);
+    EXPECT_LT(seconds, 1);
+  }
+  EXPECT_EQ(device.counters().bytes_held, 0u);
 }
 
 /// A matrix that is positive definite, and its inverse found in blocks.

@@ -69,6 +69,8 @@ MirrorDevice::Graph MirrorDevice::end_recording() {
 void MirrorDevice::replay(const Graph& graph) {
   ensures(!recording_, "a graph is replayed while another is recorded");
   ++counters_.replays;
+  ++counters_.calls;
+  counters_.launches += graph.launches.size();
   for (const auto& launch : graph.launches) launch();
 }
 
@@ -77,6 +79,7 @@ void MirrorDevice::submit(std::function<void()> launch) {
     recorded_.launches.push_back(std::move(launch));
     return;
   }
+  ++counters_.calls;
   ++counters_.launches;
   launch();
 }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "gpu/bodies/program.hpp"
 #include "gpu/device_array.hpp"
 
 namespace kerf::test {
@@ -25,6 +26,7 @@ enum class ThreadOrder { rising, falling, strided };
 struct MirrorOptions {
   ThreadOrder order = ThreadOrder::rising;
   std::size_t memory = std::size_t{1} << 34;  ///< bytes; beyond, allocations fail
+  bool updates = true;                        ///< false: the backend loads anew after each cut
 };
 
 class MirrorDevice {
@@ -52,12 +54,23 @@ class MirrorDevice {
     if (count == 0) return;
     submit([this, count, body] { each(count, body); });
   }
-  template <class Body>
-  void launch_grid(std::int32_t, const Body& body) {
-    static_assert(std::is_trivially_copyable_v<Body>, "a body is copied to the device as it is");
-    submit([this, body] { body(*this); });
+  template <class List>
+  void launch_program(const gpu::ProgramEntry* entries, std::int32_t n, std::int32_t) {
+    submit([this, entries, n] {
+      for (std::int32_t k = 0; k < n; ++k)
+        gpu::visit_body(List{}, entries[k],
+                        [&](const auto& body) { each(entries[k].count, body); });
+    });
   }
-  /// A grid is the device itself: all threads of an `each` are done before the next.
+  void begin_recording();
+  Graph end_recording();
+  void abandon_recording() noexcept { recording_ = false; }
+  void replay(const Graph& graph);
+
+  void wait() const {}
+  gpu::DeviceCounters& counters() { return counters_; }
+
+ private:
   template <class Body>
   void each(std::int32_t count, const Body& body) const {
     constexpr std::int32_t kStride = 7;
@@ -70,14 +83,6 @@ class MirrorDevice {
         for (std::int32_t i = first; i < count; i += kStride) body(i);
     }
   }
-
-  void begin_recording();
-  Graph end_recording();
-  void replay(const Graph& graph);
-
-  gpu::DeviceCounters& counters() { return counters_; }
-
- private:
   void submit(std::function<void()> launch);
   void expect_inside(const void* at, std::size_t bytes) const;
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "core/backend.hpp"
 #include "cpu/cpu_backend.hpp"
 #include "cpu/fast_backend.hpp"
+#include "gpu/cuda_backend.hpp"
 #include "tests/oracle/system_oracle.hpp"
 #include "tests/support/mirror_backend.hpp"
 #include "tests/support/scenes.hpp"
@@ -27,7 +29,19 @@ inline std::unique_ptr<Backend> make_backend(const std::string& name, int thread
   if (name == "mixed") return make_fast_backend({threads, true});
   if (name == "mirror") return make_mirror_backend(false);
   if (name == "mirror_mixed") return make_mirror_backend(true);
+  if (name == "cuda" || name == "cuda_mixed")
+    return make_cuda_backend({.device = 0, .single_cycle = name == "cuda_mixed"});
   return nullptr;
+}
+
+/// Why a backend of make_backend cannot be had here; empty where it can.
+inline std::string why_missing(const std::string& name) {
+  return name.rfind("cuda", 0) == 0 ? cuda_problem() : std::string();
+}
+/// Whether KERF_REQUIRE names it: tests then fail where it is missing, and do not skip.
+inline bool is_required(const std::string& name) {
+  const char* required = std::getenv("KERF_REQUIRE");
+  return required != nullptr && name.rfind(required, 0) == 0;
 }
 
 enum class Holds {
