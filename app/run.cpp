@@ -75,11 +75,14 @@ class Run {
 
   void say_body() {
     const auto& s = simulation_;
+    const std::string why = why_on_cpu(scene_.setup.solver);
     say(fmt::format("{} cells, {} vertices, {} levels, {}, backend {} with {} {}{}", s.cells(),
                     s.vertices(), s.hierarchy().levels.size(), bytes_text(s.bytes()),
                     s.backend().name(), s.backend().threads(),
                     s.backend().threads() == 1 ? "thread" : "threads",
-                    scene_.setup.solver.backend == "auto" ? " (chosen by auto)" : ""));
+                    scene_.setup.solver.backend != "auto" ? ""
+                    : why.empty()                         ? " (chosen by auto)"
+                                  : " (chosen by auto; cuda: " + why + ")"));
   }
 
   void say_warnings() {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "app/backends.hpp"
 #include "core/base/error.hpp"
@@ -41,8 +43,21 @@ std::unique_ptr<Backend> open_backend(const Scene& scene) {
 }
 
 Simulation open_simulation(const Scene& scene, std::unique_ptr<Backend> backend) {
-  return with_place(scene.file.string(),
-                    [&] { return Simulation(scene.setup, std::move(backend)); });
+  const std::string name = backend->name();
+  const bool may_fall_back =
+      scene.setup.solver.backend == "auto" && name != "cpu" && name != "reference";
+  return with_place(scene.file.string(), [&] {
+    if (!may_fall_back) return Simulation(scene.setup, std::move(backend));
+    try {
+      return Simulation(scene.setup, std::move(backend));
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::unavailable) throw;
+      std::fprintf(stderr, "kerf: warning: %s; goes on with backend cpu\n", error.what());
+    }
+    SolverSetup on_cpu = scene.setup.solver;
+    on_cpu.backend = "cpu";
+    return Simulation(scene.setup, make_backend(on_cpu));
+  });
 }
 
 std::string bytes_text(std::size_t bytes) {

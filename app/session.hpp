@@ -10,6 +10,8 @@ namespace kerf {
 
 /// @throws Error (bad_input, unavailable) that begins with a place in the scene.
 std::unique_ptr<Backend> open_backend(const Scene& scene);
+/// Where "auto" chose a GPU whose memory does not hold the body: on the CPU, with a warning on the
+/// standard error.
 Simulation open_simulation(const Scene& scene, std::unique_ptr<Backend> backend);
 
 /// "12.3 MB"

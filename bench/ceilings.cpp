@@ -10,6 +10,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/timer.hpp"
+#include "gpu/cuda_backend.hpp"
 
 namespace kerf::bench {
 namespace {
@@ -111,7 +112,7 @@ Ceilings::Ceilings(const std::vector<int>& threads, bool small) : small_(small) 
   for (const int count : threads)
     for (const auto& [name, precision] :
          {std::pair{"triad", "double"}, {"fma-float", "single"}, {"fma-double", "double"}})
-      all_.push_back({name, precision, count, 0, 0, {}});
+      all_.push_back({name, precision, count, 0, 0, {}, "machine"});
 }
 
 void Ceilings::measure() {
@@ -132,9 +133,19 @@ void Ceilings::measure() {
     }
 }
 
-double Ceilings::best(const char* name, int threads) const {
+void Ceilings::add_gpu() {
+  if (!gpu_.empty()) return;
+  const CudaCeilings found = measure_cuda_ceilings();
+  const double flops = 2e-9 * found.multiply_adds;
+  gpu_ = {
+      {"triad", "double", 1, found.elements, 24e-9 * found.elements, {found.triad_seconds}, "cuda"},
+      {"fma-float", "single", 1, found.multiply_adds, flops, {found.float_seconds}, "cuda"},
+      {"fma-double", "double", 1, found.multiply_adds, flops, {found.double_seconds}, "cuda"}};
+}
+
+double Ceilings::best(const char* name, int threads, const std::string& machine) const {
   double out = 0;
-  for (const Ceiling& ceiling : all_)
+  for (const Ceiling& ceiling : machine == "cuda" ? gpu_ : all_)
     if (ceiling.threads <= threads && std::strcmp(ceiling.name, name) == 0)
       out = std::max(out, ceiling.best());
   ensures(out > 0, "the ceilings of these threads were measured");

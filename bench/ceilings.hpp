@@ -4,6 +4,7 @@
 // loop of fused multiply-adds in registers.
 #pragma once
 
+#include <string>
 #include <vector>
 
 namespace kerf::bench {
@@ -16,6 +17,7 @@ struct Ceiling {
   double items = 0;  ///< elements of the triad, fused multiply-adds; a run
   double giga = 0;   ///< a run: GB moved, or GFLOP
   std::vector<double> seconds;
+  std::string machine = "machine";  ///< or "cuda": the GPU
 
   double best() const;  ///< GB/s or GFLOP/s of the fastest run
 };
@@ -27,20 +29,26 @@ class Ceilings {
 
   /// Some more runs of each; the best of all calls count.
   void measure();
+  /// Those of the GPU, once. @throws Error (unavailable) where there is none.
+  void add_gpu();
 
   const std::vector<Ceiling>& all() const { return all_; }
+  const std::vector<Ceiling>& gpu() const { return gpu_; }
   // The best with so many threads or fewer: on a shared machine more of them may measure less.
-  double bytes_per_second(int threads) const { return 1e9 * best("triad", threads); }
+  double bytes_per_second(int threads, const std::string& machine = "machine") const {
+    return 1e9 * best("triad", threads, machine);
+  }
   /// Instructions on single numbers: a fused multiply-add is one here, and two FLOP in the table.
-  double slots_per_second(int threads, bool in_single) const {
-    return 0.5e9 * best(in_single ? "fma-float" : "fma-double", threads);
+  double slots_per_second(int threads, bool in_single,
+                          const std::string& machine = "machine") const {
+    return 0.5e9 * best(in_single ? "fma-float" : "fma-double", threads, machine);
   }
 
  private:
-  double best(const char* name, int threads) const;
+  double best(const char* name, int threads, const std::string& machine) const;
 
   bool small_;
-  std::vector<Ceiling> all_;
+  std::vector<Ceiling> all_, gpu_;
 };
 
 }  // namespace kerf::bench

@@ -35,7 +35,8 @@ void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
   constexpr int kCountDigits = 15;
   std::ostringstream out;
   out << "scene,backend,threads,precision,cells,vertices,levels,phase,ms_min,ms_median,"
-         "ns_per_cell,gb_per_s,residual,state_hash,commit,build,machine,of_ceiling,peak_bytes\n";
+         "ns_per_cell,gb_per_s,residual,state_hash,commit,build,machine,of_ceiling,peak_bytes,"
+         "launches,bytes_copied\n";
   for (const Row& r : rows)
     out << r.scene << ',' << r.backend << ',' << r.threads << ',' << r.precision << ','
         << field(r.cells, kCountDigits) << ',' << field(r.vertices, kCountDigits) << ','
@@ -43,7 +44,8 @@ void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
         << field(r.ms_min) << ',' << field(r.ms_median) << ',' << field(r.ns_per_cell) << ','
         << field(r.gb_per_s) << ',' << field(r.residual) << ',' << r.state_hash << ','
         << origin.commit << ',' << origin.build << ',' << origin.machine << ','
-        << field(r.of_ceiling, 3) << ',' << field(r.peak_bytes, kCountDigits) << '\n';
+        << field(r.of_ceiling, 3) << ',' << field(r.peak_bytes, kCountDigits) << ','
+        << field(r.launches, kCountDigits) << ',' << field(r.bytes_copied, kCountDigits) << '\n';
   std::ofstream stream(file);
   stream << out.str();
   stream.close();

@@ -28,6 +28,8 @@ struct Row {
   std::string state_hash;
   double of_ceiling = kNone;  ///< least time by the ceilings over that of the fastest run
   double peak_bytes = kNone;
+  double launches = kNone;      ///< of a device, in the last run
+  double bytes_copied = kNone;  ///< to a device and from it, in the last run
 };
 
 /// What all rows of a run share.

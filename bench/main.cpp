@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <unistd.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdio>
@@ -9,11 +10,13 @@
 
 #include "app/commands.hpp"
 #include "app/version.hpp"
+#include "bench/compare.hpp"
 #include "bench/machine_name.hpp"
 #include "bench/measure.hpp"
 #include "bench/options.hpp"
 #include "bench/plot.hpp"
 #include "core/base/error.hpp"
+#include "gpu/cuda_backend.hpp"
 
 namespace {
 
@@ -93,6 +96,10 @@ int measure(const Options& options) {
   Ceilings ceilings(options.threads, options.size == Size::small);
   std::vector<Row> rows;
   save(options, {}, {});
+  // Where it was asked for by name and there is none, this is the error.
+  const bool gpu =
+      std::find(options.backends.begin(), options.backends.end(), "cuda") != options.backends.end();
+  if (gpu && (!options.all_backends || cuda_problem().empty())) ceilings.add_gpu();
   console.head();
   for (const std::string& scene : options.scenes) {
     console.progress(scene + ": measuring the machine");
@@ -105,6 +112,8 @@ int measure(const Options& options) {
   const std::vector<Row> machine = ceiling_rows(ceilings);
   for (const Row& row : machine) console.row(row);
   save(options, machine, rows);
+  if (!options.compare.empty())
+    std::printf("\n%s", comparison(rows, options.compare[0], options.compare[1]).c_str());
   return kDone;
 }
 

@@ -74,6 +74,7 @@ struct Entrant {
   double peak = 0;
   std::uint64_t hash = 0;
   double residual = kNone;
+  DeviceWork work;  // of the last run
 };
 
 class SceneRun {
@@ -215,9 +216,9 @@ std::vector<Entrant> SceneRun::entrants_of(const Phase& phase) {
   for (std::size_t i = 0; i < trials_.size(); ++i) {
     const Candidate& candidate = trials_[i]->candidate;
     if (!candidate.phases.empty() && !candidate.phases.contains(phase.name)) continue;
-    // Gauss-Seidel is at home in the reference backend alone.
+    // The fast CPU backend has no Gauss-Seidel.
     if (phase.name == std::string_view("smooth-gauss-seidel") &&
-        trials_[i]->backend().name() != std::string_view("reference"))
+        trials_[i]->backend().name() == std::string_view("cpu"))
       continue;
     const std::int32_t vertices = body_->finest().vertices();
     if (candidate.most_vertices > 0 && vertices > candidate.most_vertices) {
@@ -266,10 +267,13 @@ void SceneRun::measure(const Phase& phase) {
 void SceneRun::run_once(const Phase& phase, Entrant& entrant) {
   Trial& trial = *entrant.trial;
   phase.prepare(trial);
+  trial.backend().wait();
   reset_memory_peak();
+  const DeviceWork before = trial.backend().device_work();
   const Timer timer;
   try {
     phase.run(trial);
+    trial.backend().wait();
   } catch (const GaveUp&) {
     entrant.gave_up = true;
     listener_.note(text("gave up ", phase.name, " of ", scene_, " by ", trial.candidate.name,
@@ -277,6 +281,9 @@ void SceneRun::run_once(const Phase& phase, Entrant& entrant) {
     return;
   }
   const double seconds = timer.seconds();
+  const DeviceWork after = trial.backend().device_work();
+  entrant.work = {after.calls - before.calls, after.launches - before.launches,
+                  after.bytes_up - before.bytes_up, after.bytes_down - before.bytes_down};
   double others = 0;
   for (const Seat& seat : seats_)
     if (seat.machine && &seat != entrant.seat)
@@ -337,15 +344,21 @@ void SceneRun::add_row(const Phase& phase, const Entrant& entrant) {
   row.residual = entrant.residual;
   row.state_hash = hex(entrant.hash);
   row.peak_bytes = entrant.peak;
+  if (seat.backend == "cuda") {
+    row.launches = static_cast<double>(entrant.work.launches);
+    row.bytes_copied = static_cast<double>(entrant.work.bytes_up + entrant.work.bytes_down);
+  }
   const Work work = phase.work(trial);
   if (work.slots > 0) {
     const double bytes =
         seat.precision == Precision::double_ ? work.bytes_double : work.bytes_single;
     row.gb_per_s = 1e-9 * bytes * row.cells / seconds;
     const bool in_single = seat.precision != Precision::double_;
-    row.of_ceiling = row.cells / seconds *
-                     std::max(bytes / ceilings_.bytes_per_second(row.threads),
-                              work.slots / ceilings_.slots_per_second(row.threads, in_single));
+    const std::string machine = seat.backend == "cuda" ? "cuda" : "machine";
+    row.of_ceiling =
+        row.cells / seconds *
+        std::max(bytes / ceilings_.bytes_per_second(row.threads, machine),
+                 work.slots / ceilings_.slots_per_second(row.threads, in_single, machine));
   }
   if (static_cast<int>(entrant.seconds.size()) < options_.repeat)
     listener_.note(text(scene_, ", ", phase.name, ", ", row.backend, ", threads ", row.threads,
@@ -364,10 +377,13 @@ std::vector<Row> measure_scene(const std::string& scene, const Options& options,
 
 std::vector<Row> ceiling_rows(const Ceilings& ceilings) {
   std::vector<Row> out;
-  for (const Ceiling& ceiling : ceilings.all()) {
+  std::vector<Ceiling> all = ceilings.all();
+  all.insert(all.end(), ceilings.gpu().begin(), ceilings.gpu().end());
+  for (const Ceiling& ceiling : all) {
     const double seconds = least(ceiling.seconds);
     Row row;
-    row.scene = row.backend = "machine";
+    row.scene = "machine";
+    row.backend = ceiling.machine;
     row.threads = ceiling.threads;
     row.precision = ceiling.precision;
     row.cells = ceiling.items;

@@ -110,6 +110,12 @@ const std::map<std::string, Setter>& setters() {
          o.backends = choose("--backend", "backend", v, names_of(candidates()));
          o.all_backends = v == kAll;
        }},
+      {"--compare",
+       [](Options& o, const std::string& v) {
+         o.compare = split(v);
+         expects(o.compare.size() == 2, "--compare needs two backends, as in cpu,cuda");
+         o.backends = choose("--compare", "backend", v, names_of(candidates()));
+       }},
       {"--threads", [](Options& o, const std::string& v) { o.threads = choose_threads(v); }},
       {"--precision",
        [](Options& o, const std::string& v) {
@@ -177,6 +183,7 @@ std::string usage() {
          "       kerf_bench --list                   scenes, backends, phases\n"
          "\n"
          "  --backend LIST     what runs (default: cpu)\n"
+         "  --compare A,B      runs these two backends; ends with a table of both side by side\n"
          "  --threads LIST     numbers of threads (default: all cores)\n"
          "  --precision LIST   single, mixed, double (default: double)\n"
          "  --phase LIST       what is timed (default: all)\n"

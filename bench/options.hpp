@@ -15,8 +15,9 @@ struct Options {
   std::vector<std::string> scenes, backends{"cpu"}, precisions{"double"}, phases;
   std::vector<int> threads;
   int repeat = 5;
-  double seconds = 0;  ///< > 0: no further run of a variant that has taken so long
-  double give_up = 0;  ///< > 0: longest run of a solve, s
+  double seconds = 0;                ///< > 0: no further run of a variant that has taken so long
+  double give_up = 0;                ///< > 0: longest run of a solve, s
+  std::vector<std::string> compare;  ///< two backends, or none
   std::string csv, meshes, machine, plot, svg;
   Size size = Size::full;
   /// Whether a list was `all`: what cannot be had is then left out in silence.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Installed tree: include/kerf/{kernels,core,cpu}/..., lib/, lib/cmake/kerf/, bin/kerf.
+# Installed tree: include/kerf/{kernels,core,cpu,gpu}/..., lib/, lib/cmake/kerf/, bin/kerf.
 set(kerf_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/kerf)
 list(TRANSFORM kerf_parts PREPEND kerf_ OUTPUT_VARIABLE kerf_targets)
 install(TARGETS ${kerf_targets} EXPORT kerf

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "core/backend.hpp"
 
+#include <vector>
+
 #include "core/base/error.hpp"
+#include "kernels/noise.hpp"
 
 namespace kerf {
 
@@ -29,6 +32,25 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
   add(0, a, d, x);
   add(0, -a, q, r);
   return dot(0, r, r);
+}
+
+void Backend::write_noise(int level, int x, std::size_t size) {
+  std::vector<double> values(size);
+  for (std::size_t i = 0; i < size; ++i) values[i] = kernels::noise(i);
+  write(level, x, values);
+}
+
+bool Backend::advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state) {
+  const auto [rho, overlap] = state.first ? std::array{dot(0, z, r), 0.0} : dots(z, r, q);
+  if (!(rho > 0)) return false;
+  const double beta = state.first ? 0 : -state.alpha * overlap / state.rho;
+  state.first = false;
+  const auto [curvature, slope] = advance_direction(z, beta, d, q, r);
+  if (!(curvature > 0)) return false;
+  state.rho = rho;
+  state.alpha = slope / curvature;
+  state.residual2 = advance_solution(state.alpha, d, q, x, r);
+  return true;
 }
 
 void Backend::update(const Hierarchy&, const HierarchyChange&) { ensures(false, kNoUpdates); }

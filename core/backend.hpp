@@ -46,6 +46,22 @@ struct SmootherOptions {
   double smallest = 1.0 / 8;  ///< Chebyshev: lower end of the range, relative to the upper
 };
 
+/// What a step of conjugate gradients leaves to the next one.
+struct ConjugateState {
+  double rho = 0, alpha = 0;  ///< r.z and the length of the step
+  double residual2 = 0;       ///< r.r after the step
+  bool first = true;
+};
+
+/// What a device was asked for since the backend was made; zero where there is none.
+struct DeviceWork {
+  std::size_t calls = 0;     ///< of the host: launches, and graphs of launches
+  std::size_t launches = 0;  ///< those in graphs too
+  std::size_t bytes_up = 0, bytes_down = 0;
+};
+
+struct CycleOptions;  // core/solve/cycle.hpp
+
 /// Holds one simulation's matrices and vectors and runs the loops over them.
 /// Not thread-safe. A call may return early; the next call on the same object sees its result.
 /// Fixed components take no part: operators read them as zero and leave zero in them.
@@ -61,6 +77,8 @@ class Backend {
   /// About how much memory of this machine a run takes for each cell of a refined body, all that
   /// others hold of it included; its surface is not.
   virtual double bytes_per_cell() const noexcept;
+  virtual void wait() const {}  ///< until all that was asked for is done
+  virtual DeviceWork device_work() const { return {}; }
 
   // Structure.
   /// Topology; again after each cut. Vectors and rotations are then zero and identity.
@@ -106,6 +124,9 @@ class Backend {
   virtual void solve_coarsest() = 0;                   ///< u from f
   virtual void apply(int level, int in, int out) = 0;  ///< out = A in
   virtual void precondition_jacobi(int level, int in, int out) = 0;  ///< out = D^-1 in
+  /// A whole cycle on level 0, where a backend has one of its own; else false, and the caller runs
+  /// the operations above.
+  virtual bool run_cycle(const CycleOptions&) { return false; }
 
   // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here
   // said with the operations above.
@@ -115,6 +136,9 @@ class Backend {
   virtual std::array<double, 2> advance_direction(int z, double beta, int d, int q, int r);
   /// x += a d and r -= a q; returns r.r.
   virtual double advance_solution(double a, int d, int q, int x, int r);
+  /// A whole step behind z = B r, flexible: beta from the change of the residual (Polak, Ribiere).
+  /// Returns false where r is zero or rounding has won; x and r are then as before.
+  virtual bool advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state);
 
   // Forces, level 0.
   /// out = sum over cells of [R] K ([R]^T (x + u) - x); held components too (reactions).
@@ -140,6 +164,8 @@ class Backend {
   virtual void mask(int level, int x) = 0;  ///< zero in fixed components
   virtual void write(int level, int x, std::span<const double> values) = 0;
   virtual void read(int level, int x, std::span<double> values) const = 0;
+  /// kernels/noise.hpp, of all `size` components of the level.
+  virtual void write_noise(int level, int x, std::size_t size);
 
   // Updates: what a cut costs follows what it touched.
   /// The hierarchy that was loaded has changed in place, where `change` tells. Vectors keep what

@@ -15,6 +15,8 @@ struct CycleOptions {
   int pre_sweeps = 1, post_sweeps = 1;
   /// Post-smoothing runs the colours backwards, so that the cycle may precondition CG.
   bool symmetric = true;
+
+  bool operator==(const CycleOptions&) const = default;
 };
 
 class Cycle {
@@ -23,7 +25,9 @@ class Cycle {
       : backend_(backend), coarsest_(levels - 1), options_(options) {}
 
   /// Improves u of A u = f on level 0.
-  void run() { descend(0); }
+  void run() {
+    if (!backend_.run_cycle(options_)) descend(0);
+  }
 
  private:
   void descend(int level);

@@ -140,22 +140,11 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
   const double before = norm / reference;
   for (int start = 0; start < kRestarts && stats.cycles < limit; ++start) {
     if (!fixed && norm <= goal) break;
-    double rho = 0, alpha = 0;
-    bool first = true;
+    ConjugateState state;
     while (stats.cycles < limit && (fixed || norm > goal)) {
       precondition(jacobi);
-      const auto [rho_next, overlap] = first
-                                           ? std::array{backend_.dot(0, kSolution, residual_), 0.0}
-                                           : backend_.dots(kSolution, residual_, product_);
-      if (!(rho_next > 0)) break;  // r is zero, or rounding has won
-      const double beta = first ? 0 : -alpha * overlap / rho;
-      first = false;
-      const auto [curvature, slope] =
-          backend_.advance_direction(kSolution, beta, direction_, product_, residual_);
-      if (!(curvature > 0)) break;
-      rho = rho_next;
-      alpha = slope / curvature;
-      norm = std::sqrt(backend_.advance_solution(alpha, direction_, product_, x, residual_));
+      if (!backend_.advance_conjugate(kSolution, direction_, product_, x, residual_, state)) break;
+      norm = std::sqrt(state.residual2);
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / reference);
     }

@@ -3,24 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <vector>
 
 namespace kerf {
 namespace {
-
-// Random values, the same everywhere: splitmix64 on the index, in [-1, 1).
-std::vector<double> noise(std::size_t size) {
-  std::vector<double> out(size);
-  for (std::size_t i = 0; i < size; ++i) {
-    std::uint64_t z = (i + 1) * 0x9E3779B97F4A7C15U;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
-    z ^= z >> 31;
-    out[i] = static_cast<double>(z >> 11) * 0x1p-52 - 1.0;
-  }
-  return out;
-}
 
 // Largest eigenvalue of a symmetric tridiagonal matrix by bisection on Sturm counts.
 double largest_eigenvalue(const std::vector<double>& diagonal, const std::vector<double>& beside) {
@@ -52,7 +38,7 @@ double estimate_spectral_bound(Backend& backend, int level, const Level& structu
   // [l/8, l] still damps at 1.13 l, so that a margin of a tenth is on the safe side twice.
   constexpr double kMargin = 1.1;
   const int r = kResidual, p = kDirection, q = kRight, z = kSolution;  // those of every cycle
-  backend.write(level, r, noise(3 * structure.point.size()));
+  backend.write_noise(level, r, 3 * structure.point.size());
   backend.mask(level, r);
   std::vector<double> diagonal, beside;
   double rho = 0, alpha = 0, beta = 0;

@@ -179,8 +179,8 @@ TEST_F(KerfCommand, RefusesABodyBeyondTheMemoryBeforeAllocating) {
 }
 
 TEST_F(KerfCommand, RefusesABackendThatIsNotThere) {
-  if (kerf("info").out.find("cuda      not in this version") == std::string::npos)
-    GTEST_SKIP() << "the CUDA backend is built";
+  if (kerf("info").out.find("cuda      not there") == std::string::npos)
+    GTEST_SKIP() << "there is a GPU";
   expect_refused(run_scene(kBlock, "--set solver.backend=cuda"), 4, {"no CUDA backend", "cpu"});
 }
 
@@ -195,6 +195,15 @@ TEST_F(KerfCommand, SaysItsInstructionSetAndRefusesAWordThatIsNone) {
   unsetenv("KERF_INSTRUCTION_SET");
 
   expect_refused(outcome, 2, {"KERF_INSTRUCTION_SET", "abacus", chosen});
+}
+
+TEST_F(KerfCommand, AutoSaysWhyItTakesTheCpu) {
+  const Outcome outcome = run_scene(kBlock, "--set solver.backend=auto");
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.out.find("chosen by auto"), std::string::npos) << outcome.out;
+  if (kerf("info").out.find("cuda      not there: ") == std::string::npos)
+    GTEST_SKIP() << "there is a GPU";
+  EXPECT_NE(outcome.out.find("; cuda: "), std::string::npos) << outcome.out;
 }
 
 TEST_F(KerfCommand, RefusesAFolderThatCannotBeWritten) {

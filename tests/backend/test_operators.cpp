@@ -59,6 +59,12 @@ using Parameters = std::tuple<std::string, std::string>;  // backend, scene
 
 class Operators : public ::testing::TestWithParam<Parameters> {
  protected:
+  void SetUp() override {
+    const std::string why = test::why_missing(machine());
+    if (why.empty()) return;
+    if (test::is_required(machine())) FAIL() << why;
+    GTEST_SKIP() << why;
+  }
   std::string machine() const { return std::get<0>(GetParam()); }
   std::string scene() const { return std::get<1>(GetParam()); }
 
@@ -77,6 +83,12 @@ INSTANTIATE_TEST_SUITE_P(Backends, Operators,
                                             ::testing::Values("one_cell", "uniform", "floating",
                                                               "bar", "octree1", "octree2",
                                                               "half_cut", "crossed", "limbs")),
+                         name_of);
+
+INSTANTIATE_TEST_SUITE_P(Device, Operators,
+                         ::testing::Combine(::testing::Values("mirror", "cuda"),
+                                            ::testing::Values("one_cell", "floating", "bar",
+                                                              "half_cut", "crossed")),
                          name_of);
 
 TEST_P(Operators, RotationsAreThoseOfTheSingularValues) {

@@ -77,20 +77,35 @@ using Parameters = std::tuple<std::string, SurfaceMethod, std::string>;
 
 class BackendSurface : public ::testing::TestWithParam<Parameters> {
  protected:
+  void SetUp() override {
+    const std::string why = test::why_missing(machine());
+    if (why.empty()) return;
+    if (test::is_required(machine())) FAIL() << why;
+    GTEST_SKIP() << why;
+  }
   std::string machine() const { return std::get<0>(GetParam()); }
   SurfaceMethod method() const { return std::get<1>(GetParam()); }
   Moved moved() const { return {test::scene(std::get<2>(GetParam())), method(), machine()}; }
 };
 
-INSTANTIATE_TEST_SUITE_P(
-    Backends, BackendSurface,
-    ::testing::Combine(::testing::Values("cpu"), ::testing::ValuesIn(test::kMethods),
-                       ::testing::Values("one_cell", "floating", "bar", "octree2", "half_cut",
-                                         "crossed", "limbs")),
-    [](const auto& p) {
-      return std::get<0>(p.param) + "_" + test::method_name(std::get<1>(p.param)) + "_" +
-             std::get<2>(p.param);
-    });
+std::string name_of(const ::testing::TestParamInfo<Parameters>& p) {
+  return std::get<0>(p.param) + "_" + test::method_name(std::get<1>(p.param)) + "_" +
+         std::get<2>(p.param);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, BackendSurface,
+                         ::testing::Combine(::testing::Values("cpu"),
+                                            ::testing::ValuesIn(test::kMethods),
+                                            ::testing::Values("one_cell", "floating", "bar",
+                                                              "octree2", "half_cut", "crossed",
+                                                              "limbs")),
+                         name_of);
+
+INSTANTIATE_TEST_SUITE_P(Device, BackendSurface,
+                         ::testing::Combine(::testing::Values("mirror", "cuda"),
+                                            ::testing::Values(test::kMethods[0]),
+                                            ::testing::Values("one_cell", "bar", "half_cut")),
+                         name_of);
 
 TEST_P(BackendSurface, WithoutDisplacementNothingMoves) {
   Moved m = moved();

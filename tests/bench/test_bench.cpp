@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 
+#include "bench/compare.hpp"
 #include "bench/machine_name.hpp"
 #include "bench/measure.hpp"
 #include "bench/phases.hpp"
@@ -169,6 +170,32 @@ std::string refusal(std::vector<const char*> arguments) {
   return "";
 }
 
+TEST(BenchCompare, PairsTheFastestRowsOfTheSameWork) {
+  const auto row = [](const char* backend, int threads, const char* phase, double ms) {
+    Row out;
+    out.scene = "box64";
+    out.backend = backend;
+    out.threads = threads;
+    out.precision = "double";
+    out.phase = phase;
+    out.ms_min = ms;
+    return out;
+  };
+  const std::string table = comparison({row("cpu", 1, "operator", 8), row("cpu", 2, "operator", 4),
+                                        row("cuda", 1, "operator", 0.5), row("cpu", 1, "solve", 3)},
+                                       "cpu", "cuda");
+
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 2) << table;  // a head and one line
+  EXPECT_NE(table.find("       8\n"), std::string::npos) << table;      // 4 over 0.5
+  EXPECT_EQ(table.find("solve"), std::string::npos) << table;
+}
+
+TEST(BenchOptions, CompareNamesTwoBackends) {
+  EXPECT_EQ(options({"--scene", "box64", "--compare", "reference,cpu"}).compare,
+            (std::vector<std::string>{"reference", "cpu"}));
+  EXPECT_THROW(options({"--scene", "box64", "--compare", "cpu"}), Error);
+}
+
 TEST(BenchOptions, UnknownNamesNameTheNearest) {
   EXPECT_EQ(refusal({"--scene", "box64,buny"}), "--scene: no scene 'buny'; did you mean 'bunny'?");
   EXPECT_EQ(refusal({"--scene", "box64", "--phase", "operater"}),
@@ -220,9 +247,10 @@ TEST_F(BenchFiles, TablesAreReadBack) {
 
   EXPECT_EQ(file,
             "scene,backend,threads,precision,cells,vertices,levels,phase,ms_min,ms_median,"
-            "ns_per_cell,gb_per_s,residual,state_hash,commit,build,machine,of_ceiling,peak_bytes\n"
+            "ns_per_cell,gb_per_s,residual,state_hash,commit,build,machine,of_ceiling,peak_bytes,"
+            "launches,bytes_copied\n"
             "box64,cpu,2,double,262144,274625,4,operator,26.2144,26.2144,100,,,0123456789abcdef,"
-            "c0ffee,release,epyc,,\n");
+            "c0ffee,release,epyc,,,,\n");
   const std::vector<Row> back = read_csv(root_ / "table.csv");
   ASSERT_EQ(back.size(), 1u);
   EXPECT_EQ(back[0].phase, "operator");

@@ -11,6 +11,7 @@
 #include "kernels/mat3.hpp"
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
+#include "kernels/noise.hpp"
 #include "kernels/relax.hpp"
 #include "kernels/residual.hpp"
 #include "kernels/rotation.hpp"
@@ -50,6 +51,7 @@ __global__ void touch_all(const Vec3<T>* displacement, Quat<T>* rotation, T* mat
   force[cell] = relax_vertex(corners[0], row, packed_block<T>(matrix, 0, 0), T(1));
   force[cell] = relax_vertex(force[cell], row,
                              inverse_semidefinite(cell_diagonal(K, M, R, side, side, 0)), T(1));
+  force[cell].x += static_cast<T>(noise(static_cast<std::uint64_t>(cell)));
   force[cell] += unit_or_z(area_normal(trilinear(corners, f[0]), f[1], f[2]));
 }
 

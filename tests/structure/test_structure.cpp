@@ -133,7 +133,7 @@ TEST(Structure, KernelsUseOnlyArithmeticHeaders) {
 }
 
 TEST(Structure, MacrosAndDeviceSwitchesStandInOneHeader) {
-  for (const char* folder : {"kernels", "core", "cpu", "app"})
+  for (const char* folder : {"kernels", "core", "cpu", "gpu", "app"})
     for (const auto& file : sources(folder)) {
       if (file == "kernels/host_device.hpp") continue;
       for (const auto& line : lines(content(file))) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,18 +14,35 @@
 #include "core/levels/update.hpp"
 #include "cpu/cpu_backend.hpp"
 #include "cpu/fast_backend.hpp"
+#include "gpu/cuda_backend.hpp"
 #include "tests/oracle/system_oracle.hpp"
+#include "tests/support/mirror_backend.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kerf::test {
 
-/// "cpu": the reference backend. Null for a backend that was not built.
+/// "cpu": the reference backend; "mirror": that of a device, on the host. Null for a backend that
+/// was not built.
 inline std::unique_ptr<Backend> make_backend(const std::string& name, int threads = 1,
                                              int tile_log2 = 0) {
   if (name == "cpu") return make_cpu_backend({threads, tile_log2});
   if (name == "fast") return make_fast_backend({threads, false});
   if (name == "mixed") return make_fast_backend({threads, true});
+  if (name == "mirror") return make_mirror_backend(false);
+  if (name == "mirror_mixed") return make_mirror_backend(true);
+  if (name == "cuda" || name == "cuda_mixed")
+    return make_cuda_backend({.device = 0, .single_cycle = name == "cuda_mixed"});
   return nullptr;
+}
+
+/// Why a backend of make_backend cannot be had here; empty where it can.
+inline std::string why_missing(const std::string& name) {
+  return name.rfind("cuda", 0) == 0 ? cuda_problem() : std::string();
+}
+/// Whether KERF_REQUIRE names it: tests then fail where it is missing, and do not skip.
+inline bool is_required(const std::string& name) {
+  const char* required = std::getenv("KERF_REQUIRE");
+  return required != nullptr && name.rfind(required, 0) == 0;
 }
 
 enum class Holds {

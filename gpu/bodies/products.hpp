@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: MIT
+//
+// Products, smoothing and transfer. Two passes make each free of conflicts: a thread a cell writes
+// what the cell adds to its slots, then a thread a vertex gathers its incidences in their order and
+// finishes with the sum (residual, step of Chebyshev). No atomics, and the same bits in any order
+// of threads.
+//
+// Layout  level_view.hpp.
+#pragma once
+
+#include "gpu/bodies/values.hpp"
+#include "gpu/bodies/vectors.hpp"
+#include "kernels/relax.hpp"
+
+namespace kerf::gpu {
+
+// ---- a thread a cell -------------------------------------------------------------------------
+
+/// f = (stiffness [R] K [R]^T + mass M) u of a finest cell over its slots; f may be u.
+template <class T>
+KERF_HD void finest_product(const LevelView& level, const FinestView<T>& finest, std::int32_t cell,
+                            const Vec3<T> (&u)[kCorners], Vec3<T> (&f)[kCorners]) {
+  const Mat3<T> R = rotation_of(finest, cell);
+  const kernels::ModeConstants<T>& constants = finest.material(cell).modes;
+  const T stiffness = finest.stiffness(cell), mass = finest.inertia(cell);
+  const std::uint16_t fold = level.fold[cell];
+  if (!kernels::has_hanging(fold)) {
+    kernels::apply_cell(u, R, stiffness, mass, constants, f);
+    return;
+  }
+  Vec3<T> corners[kCorners];
+  kernels::unfold(u, fold, corners);
+  kernels::apply_cell(corners, R, stiffness, mass, constants, corners);
+  kernels::fold_transpose(corners, fold, f);
+}
+
+template <class T>
+struct FinestProduct {
+  LevelView level;
+  FinestView<T> finest;
+  const T* u;
+  T* records;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<T> at[kCorners], f[kCorners];
+    load_slots(level, cell, u, at);
+    finest_product(level, finest, cell, at, f);
+    store_record(records, cell, f);
+  }
+};
+
+template <class T>
+struct StoredProduct {
+  LevelView level;
+  const T* matrices;
+  const T* u;
+  T* records;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<T> at[kCorners], f[kCorners];
+    load_slots(level, cell, u, at);
+    kernels::apply_packed(
+        kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2), at,
+        f);
+    store_record(records, cell, f);
+  }
+};
+
+/// The elastic force of a cell; see kernels/modes.hpp.
+struct ElasticForce {
+  LevelView level;
+  FinestView<double> finest;
+  const double* displacement;
+  double* records;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<double> at[kCorners], corners[kCorners];
+    load_slots(level, cell, displacement, at);
+    kernels::unfold(at, level.fold[cell], corners);
+    kernels::elastic_force(corners, finest.rotation[cell], finest.side(cell),
+                           finest.element[cell].stiffness, finest.material(cell).modes.stiffness,
+                           corners);
+    kernels::fold_transpose(corners, level.fold[cell], at);
+    store_record(records, cell, at);
+  }
+};
+
+// ---- a thread a vertex -----------------------------------------------------------------------
+
+/// out = the sum.
+template <class T>
+struct StoreSum {
+  LevelView level;
+  const T* records;
+  T* out;
+  bool masks;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const Vec3<T> sum = gather_records(level, records, vertex);
+    store(out, vertex, masks ? masked(sum, level.fixed[vertex]) : sum);
+  }
+};
+
+/// r = f - the sum.
+template <class T>
+struct StoreResidual {
+  LevelView level;
+  const T* records;
+  const T* f;
+  T* r;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const Vec3<T> sum = masked(gather_records(level, records, vertex), level.fixed[vertex]);
+    store(r, vertex, load(f, vertex) - sum);
+  }
+};
+
+/// A step of Chebyshev acceleration of block Jacobi: d = keep d + take D^-1 (f - the sum), u += d.
+/// Without records u is zero, and the first step needs no product.
+///
+/// Shapes  factors: take and keep of this step; on the device, since they change with the operator.
+/// Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, algorithm 12.1.
+template <class T>
+struct ChebyshevStep {
+  LevelView level;
+  const T* records;  ///< or null
+  const Sym3<T>* inverse;
+  const T* factors;
+  const T* f;
+  T *d, *u;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    Vec3<T> r = load(f, vertex), before{};
+    if (records != nullptr) {
+      r -= masked(gather_records(level, records, vertex), level.fixed[vertex]);
+      before = load(static_cast<const T*>(u), vertex);
+    }
+    Vec3<T> direction = factors[0] * (inverse[vertex] * r);
+    if (factors[1] != T(0)) direction += factors[1] * load(static_cast<const T*>(d), vertex);
+    store(d, vertex, direction);
+    store(u, vertex, before + direction);
+  }
+};
+
+/// out = D^-1 in
+template <class T, class From, class To>
+struct JacobiBody {
+  const Sym3<T>* inverse;
+  const From* in;
+  To* out;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const Vec3<From> r = load(in, vertex);
+    const Vec3<T> z =
+        inverse[vertex] * Vec3<T>{static_cast<T>(r.x), static_cast<T>(r.y), static_cast<T>(r.z)};
+    store(out, vertex, Vec3<To>{static_cast<To>(z.x), static_cast<To>(z.y), static_cast<To>(z.z)});
+  }
+};
+
+// ---- Gauss-Seidel ----------------------------------------------------------------------------
+
+/// Row of A u that belongs to a slot of a finest cell.
+template <class T>
+KERF_HD Vec3<T> finest_row(const LevelView& level, const FinestView<T>& finest, std::int32_t cell,
+                           int slot, const T* u) {
+  Vec3<T> at[kCorners];
+  load_slots(level, cell, u, at);
+  if (kernels::has_hanging(level.fold[cell])) {
+    finest_product(level, finest, cell, at, at);
+    return at[slot];
+  }
+  const kernels::HexStiffness<T>& K = finest.material(cell).stiffness;
+  const Mat3<T> R = rotation_of(finest, cell);
+  Vec3<T> elastic{}, inertia{};
+  for (int j = 0; j < kCorners; ++j) {
+    const Vec3<T> local = kernels::transpose_times(R, at[j]);
+    for (int a = 0; a < 3; ++a) {
+      const T* const row = K.k[3 * slot + a] + 3 * j;
+      elastic[a] += row[0] * local.x + row[1] * local.y + row[2] * local.z;
+    }
+    inertia += finest.mass->m[slot][j] * at[j];
+  }
+  return finest.stiffness(cell) * (R * elastic) + finest.inertia(cell) * inertia;
+}
+
+/// One colour: no two of its vertices share a cell.
+template <class T, bool is_finest>
+struct RelaxVertex {
+  LevelView level;
+  FinestView<T> finest;  ///< of level 0
+  const T* matrices;     ///< of the others
+  const Sym3<T>* inverse;
+  const std::int32_t* vertices;
+  T omega;
+  const T* f;
+  T* u;
+
+  KERF_HD void operator()(std::int32_t i) const {
+    const std::int32_t vertex = vertices[i];
+    const std::int32_t* const incidence = level.incidence + level.incidence_begin[vertex];
+    Vec3<T> r = load(f, vertex);
+    for (std::int32_t k = 0; k < level.incidence_count[vertex]; ++k)
+      r -= row(incidence[k] / kCorners, incidence[k] % kCorners);
+    store(u, vertex,
+          kernels::relax_vertex(load(static_cast<const T*>(u), vertex), r, inverse[vertex], omega));
+  }
+
+ private:
+  KERF_HD Vec3<T> row(std::int32_t cell, int slot) const {
+    if constexpr (is_finest) {
+      return finest_row(level, finest, cell, slot, static_cast<const T*>(u));
+    } else {
+      Vec3<T> at[kCorners];
+      load_slots(level, cell, static_cast<const T*>(u), at);
+      return kernels::apply_packed_row(
+          kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2),
+          slot, at);
+    }
+  }
+};
+
+// ---- transfer --------------------------------------------------------------------------------
+
+/// What the children of a coarse cell hand to its slots. A fine vertex counts once, although many
+/// cells meet it: its first incidence speaks for it.
+template <class T>
+struct RestrictCell {
+  LevelView fine, coarse;
+  const T* r;
+  T* records;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<T> sum[kCorners];
+    const std::int32_t begin = coarse.child_begin[cell];
+    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
+      const std::int32_t child = coarse.children[k];
+      T w[kCorners][kCorners];
+      kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], w);
+      for (int i = 0; i < kCorners; ++i) {
+        const std::int32_t vertex = fine.slot(child, i);
+        if (fine.incidence[fine.incidence_begin[vertex]] != kCorners * child + i) continue;
+        const Vec3<T> at = load(r, vertex);
+        for (int m = 0; m < kCorners; ++m)
+          if (w[i][m] != T(0)) sum[m] += w[i][m] * at;
+      }
+    }
+    store_record(records, cell, sum);
+  }
+};
+
+/// u += P times the coarse solution, of a fine vertex.
+template <class T>
+struct ProlongVertex {
+  LevelView fine, coarse;
+  const T* from;
+  T* u;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const std::int32_t first = fine.incidence[fine.incidence_begin[vertex]];
+    const std::int32_t child = first / kCorners, cell = fine.parent[child];
+    T w[kCorners][kCorners];
+    kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], w);
+    Vec3<T> sum{};
+    for (int m = 0; m < kCorners; ++m) {
+      const T weight = w[first % kCorners][m];
+      if (weight != T(0)) sum += weight * load(from, coarse.slot(cell, m));
+    }
+    store(u, vertex, load(static_cast<const T*>(u), vertex) + masked(sum, fine.fixed[vertex]));
+  }
+};
+
+}  // namespace kerf::gpu

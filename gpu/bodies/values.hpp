@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+//
+// Rotations, matrices and diagonal blocks: one thread a cell or a vertex.
+//
+// Layout  level_view.hpp. Matrices are over slots; rows and columns of held components are zero.
+#pragma once
+
+#include "gpu/level_view.hpp"
+#include "kernels/coarsen.hpp"
+#include "kernels/corotate.hpp"
+#include "kernels/residual.hpp"
+#include "kernels/rotation.hpp"
+#include "kernels/transfer.hpp"
+
+namespace kerf::gpu {
+
+template <class T>
+KERF_HD Mat3<T> rotation_of(const FinestView<T>& finest, std::int32_t cell) {
+  return kernels::to_matrix(finest.rotation[cell]);
+}
+
+/// Level 0: R of a cell from the displacements, in double, and rounded where the cycle is single.
+template <class S>
+struct RotateCell {
+  LevelView level;
+  const std::uint8_t* size_log2;
+  double spacing;
+  const double* displacement;
+  Quat<double>* rotation;
+  Quat<S>* rounded;  ///< or null
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<double> slots[kCorners], corners[kCorners];
+    load_slots(level, cell, displacement, slots);
+    kernels::unfold(slots, level.fold[cell], corners);
+    const double side = spacing * static_cast<double>(1 << size_log2[cell]);
+    const Quat<double> q =
+        kernels::extract_rotation(kernels::mean_gradient(corners, side), rotation[cell]);
+    rotation[cell] = q;
+    if (rounded != nullptr)
+      rounded[cell] = {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y),
+                       static_cast<S>(q.z)};
+  }
+};
+
+template <class S>
+struct RoundRotation {
+  const Quat<double>* rotation;
+  Quat<S>* rounded;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    const Quat<double> q = rotation[cell];
+    rounded[cell] = {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y),
+                     static_cast<S>(q.z)};
+  }
+};
+
+/// New cells turn as those they were a part of.
+struct InheritRotation {
+  const std::int32_t* origin;
+  std::int32_t first;
+  Quat<double>* rotation;
+
+  KERF_HD void operator()(std::int32_t i) const { rotation[first + i] = rotation[origin[i]]; }
+};
+
+/// The matrix of a finest cell over its slots.
+template <class T, class Out>
+KERF_HD void finest_matrix(const LevelView& level, const FinestView<T>& finest, std::int32_t cell,
+                           Out out) {
+  T packed[kEntries];
+  kernels::cell_matrix(finest.material(cell).stiffness, *finest.mass, rotation_of(finest, cell),
+                       finest.stiffness(cell), finest.inertia(cell), static_cast<T*>(packed));
+  const std::uint16_t fold = level.fold[cell];
+  if (kernels::has_hanging(fold)) {
+    T weights[kCorners][kCorners];
+    kernels::fold_weights(fold, weights);
+    for (int e = 0; e < kEntries; ++e) out[e] = T(0);
+    kernels::coarsen_cell(static_cast<const T*>(packed), weights, out);
+  } else {
+    for (int e = 0; e < kEntries; ++e) out[e] = packed[e];
+  }
+  for (int p = 0; p < kUnknowns; ++p) {
+    if (((level.fixed[level.slot(cell, p / 3)] >> (p % 3)) & 1) == 0) continue;
+    for (int q = 0; q < kUnknowns; ++q)
+      out[p >= q ? kernels::packed_index(p, q) : kernels::packed_index(q, p)] = T(0);
+  }
+}
+
+template <class T>
+struct FinestMatrix {
+  LevelView level;
+  FinestView<T> finest;
+  T* matrices;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    finest_matrix(
+        level, finest, cell,
+        kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2));
+  }
+};
+
+/// One matrix on its way to the host.
+struct OneFinestMatrix {
+  LevelView level;
+  FinestView<double> finest;
+  std::int32_t cell;
+  double* out;
+
+  KERF_HD void operator()(std::int32_t) const { finest_matrix(level, finest, cell, out); }
+};
+template <class T>
+struct OneStoredMatrix {
+  const T* matrices;
+  std::int32_t cell;
+  double* out;
+
+  KERF_HD void operator()(std::int32_t entry) const {
+    out[entry] = static_cast<double>(matrices[kernels::tile_index(
+        static_cast<std::size_t>(cell), static_cast<std::size_t>(entry), kEntries, kTileLog2)]);
+  }
+};
+
+/// One child's share of a coarse matrix.
+template <class T, class Matrix>
+KERF_HD void add_child(const LevelView& fine, const LevelView& coarse, std::int32_t child,
+                       std::int32_t cell, const Matrix& A, T (&sum)[kEntries]) {
+  if (fine.place[child] == kernels::kPassed) {
+    for (int e = 0; e < kEntries; ++e) sum[e] += A[e];
+    return;
+  }
+  T weights[kCorners][kCorners];
+  kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], weights);
+  kernels::coarsen_cell(A, weights, static_cast<T*>(sum));
+}
+
+template <class T>
+KERF_HD void store_matrix(T* matrices, std::int32_t cell, const T (&sum)[kEntries]) {
+  const auto to =
+      kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2);
+  for (int e = 0; e < kEntries; ++e) to[e] = sum[e];
+}
+
+/// The matrix of a cell of level 1.
+template <class T>
+struct CoarsenFinest {
+  LevelView fine, coarse;
+  FinestView<T> finest;
+  T* matrices;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    T sum[kEntries] = {};
+    const std::int32_t begin = coarse.child_begin[cell];
+    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
+      T packed[kEntries];
+      finest_matrix(fine, finest, coarse.children[k], static_cast<T*>(packed));
+      add_child(fine, coarse, coarse.children[k], cell, static_cast<const T*>(packed), sum);
+    }
+    store_matrix(matrices, cell, sum);
+  }
+};
+
+/// The matrix of a cell of a higher level.
+template <class T>
+struct CoarsenStored {
+  LevelView fine, coarse;
+  const T* from;
+  T* matrices;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    T sum[kEntries] = {};
+    const std::int32_t begin = coarse.child_begin[cell];
+    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
+      const std::int32_t child = coarse.children[k];
+      add_child(fine, coarse, child, cell,
+                kernels::cell_entries(from, static_cast<std::size_t>(child), kEntries, kTileLog2),
+                sum);
+    }
+    store_matrix(matrices, cell, sum);
+  }
+};
+
+/// The block of a slot of a finest cell with itself, held components included.
+template <class T>
+KERF_HD Sym3<T> finest_block(const LevelView& level, const FinestView<T>& finest, std::int32_t cell,
+                             int slot) {
+  const kernels::HexStiffness<T>& K = finest.material(cell).stiffness;
+  const Mat3<T> R = rotation_of(finest, cell);
+  const T stiffness = finest.stiffness(cell), mass = finest.inertia(cell);
+  const std::uint16_t fold = level.fold[cell];
+  if (!kernels::has_hanging(fold))
+    return kernels::cell_diagonal(K, *finest.mass, R, stiffness, mass, slot);
+  // Only the few corners that this slot speaks for.
+  T weights[kCorners][kCorners];
+  kernels::fold_weights(fold, weights);
+  Mat3<T> sum;
+  for (int k = 0; k < kCorners; ++k)
+    for (int l = 0; l < kCorners; ++l) {
+      const T w = weights[k][slot] * weights[l][slot];
+      if (w != T(0))
+        sum += kernels::rotate_block(K, *finest.mass, R, w * stiffness, w * mass, k, l);
+    }
+  return kernels::lower_triangle(sum);
+}
+
+template <class T>
+KERF_HD Sym3<T> inverse_of_free(Sym3<T> block, std::uint8_t fixed) {
+  if ((fixed & 1) != 0) block.xx = block.xy = block.xz = T(0);
+  if ((fixed & 2) != 0) block.yy = block.xy = block.yz = T(0);
+  if ((fixed & 4) != 0) block.zz = block.xz = block.yz = T(0);
+  return kernels::inverse_semidefinite(block);
+}
+
+/// D^-1 of a vertex of level 0.
+template <class T>
+struct InvertFinest {
+  LevelView level;
+  FinestView<T> finest;
+  Sym3<T>* inverse;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const std::int32_t* const incidence = level.incidence + level.incidence_begin[vertex];
+    Sym3<T> sum{};
+    for (std::int32_t k = 0; k < level.incidence_count[vertex]; ++k)
+      sum += finest_block(level, finest, incidence[k] / kCorners, incidence[k] % kCorners);
+    inverse[vertex] = inverse_of_free(sum, level.fixed[vertex]);
+  }
+};
+
+/// D^-1 of a vertex of a higher level.
+template <class T>
+struct InvertStored {
+  LevelView level;
+  const T* matrices;
+  Sym3<T>* inverse;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    const std::int32_t* const incidence = level.incidence + level.incidence_begin[vertex];
+    Sym3<T> sum{};
+    for (std::int32_t k = 0; k < level.incidence_count[vertex]; ++k) {
+      const auto A = kernels::cell_entries(
+          matrices, static_cast<std::size_t>(incidence[k] / kCorners), kEntries, kTileLog2);
+      sum += kernels::packed_diagonal<T>(A, incidence[k] % kCorners);
+    }
+    inverse[vertex] = inverse_of_free(sum, level.fixed[vertex]);
+  }
+};
+
+}  // namespace kerf::gpu

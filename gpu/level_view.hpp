@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+//
+// The structure and the values of one level as a device sees them: plain pointers into its memory.
+//
+// Layout  As core/levels/hierarchy.hpp: numbers of cells and vertices are the same, slots lie eight
+//         to a cell, lists have a begin and a count a row. Vectors are x0 y0 z0 x1 y1 z1 ...
+//         Matrices and records lie in tiles of 32 cells (kernels/layout.hpp), so that a warp reads
+//         an entry of its cells with one load. A record is what a cell adds to its slots: 24
+//         scalars, 3 * slot + component.
+#pragma once
+
+#include "kernels/hex_element.hpp"
+#include "kernels/layout.hpp"
+#include "kernels/mat3.hpp"
+#include "kernels/modes.hpp"
+
+namespace kerf::gpu {
+
+using kernels::fma;
+using kernels::kCorners;
+using kernels::kEntries;
+using kernels::kUnknowns;
+using kernels::Mat3;
+using kernels::Quat;
+using kernels::Sym3;
+using kernels::Vec3;
+
+inline constexpr int kTileLog2 = 5;
+
+struct LevelView {
+  std::int32_t cells, vertices;
+  const std::int32_t* slots;
+  const std::uint16_t* fold;
+  const std::int32_t* parent;  ///< not on the coarsest level
+  const std::uint8_t* place;   ///< not on the coarsest level
+  const std::uint8_t* fixed;
+  const std::int32_t *incidence_begin, *incidence_count, *incidence;
+  const std::int32_t *child_begin, *child_count, *children;  ///< not on level 0
+
+  KERF_HD std::int32_t slot(std::int32_t cell, int i) const { return slots[kCorners * cell + i]; }
+};
+
+/// What an operator is made of; see OperatorScale in core/backend.hpp.
+struct Scale {
+  double stiffness, mass;
+};
+
+/// N/m and kg, without the factors of the operator.
+template <class T>
+struct Element {
+  T stiffness, mass;
+  std::int32_t material;
+};
+
+/// Constants of one Poisson ratio.
+template <class T>
+struct MaterialConstants {
+  kernels::HexStiffness<T> stiffness;
+  kernels::ModeConstants<T> modes;
+};
+
+/// Values of level 0, which stores no matrices.
+template <class T>
+struct FinestView {
+  const Quat<T>* rotation;
+  const Element<T>* element;
+  const std::uint8_t* size_log2;
+  const MaterialConstants<T>* materials;
+  const kernels::HexMass<T>* mass;
+  const Scale* scale;
+  double spacing;
+
+  KERF_HD T side(std::int32_t cell) const {
+    return static_cast<T>(spacing * static_cast<double>(1 << size_log2[cell]));
+  }
+  KERF_HD T stiffness(std::int32_t cell) const {
+    return static_cast<T>(scale->stiffness) * element[cell].stiffness;
+  }
+  KERF_HD T inertia(std::int32_t cell) const {
+    return static_cast<T>(scale->mass) * element[cell].mass;
+  }
+  KERF_HD const MaterialConstants<T>& material(std::int32_t cell) const {
+    return materials[element[cell].material];
+  }
+};
+
+/// A vertex of a vector.
+template <class T>
+KERF_HD Vec3<T> load(const T* x, std::int32_t vertex) {
+  const T* at = x + 3 * static_cast<std::size_t>(vertex);
+  return {at[0], at[1], at[2]};
+}
+template <class T>
+KERF_HD void store(T* x, std::int32_t vertex, const Vec3<T>& value) {
+  T* at = x + 3 * static_cast<std::size_t>(vertex);
+  at[0] = value.x;
+  at[1] = value.y;
+  at[2] = value.z;
+}
+
+/// Zero in held components.
+template <class T>
+KERF_HD Vec3<T> masked(Vec3<T> v, std::uint8_t fixed) {
+  for (int c = 0; c < 3; ++c)
+    if (((fixed >> c) & 1) != 0) v[c] = T(0);
+  return v;
+}
+
+/// The vertices of a cell.
+template <class T>
+KERF_HD void load_slots(const LevelView& level, std::int32_t cell, const T* x,
+                        Vec3<T> (&out)[kCorners]) {
+  for (int i = 0; i < kCorners; ++i) out[i] = load(x, level.slot(cell, i));
+}
+
+template <class T>
+KERF_HD void store_record(T* records, std::int32_t cell, const Vec3<T> (&f)[kCorners]) {
+  const auto to =
+      kernels::cell_entries(records, static_cast<std::size_t>(cell), kUnknowns, kTileLog2);
+  for (int i = 0; i < kCorners; ++i)
+    for (int c = 0; c < 3; ++c) to[3 * i + c] = f[i][c];
+}
+
+/// What the cells around a vertex add to it, in the order of its incidences.
+template <class T>
+KERF_HD Vec3<T> gather_records(const LevelView& level, const T* records, std::int32_t vertex) {
+  const std::int32_t* const incidence = level.incidence + level.incidence_begin[vertex];
+  Vec3<T> sum{};
+  for (std::int32_t k = 0; k < level.incidence_count[vertex]; ++k) {
+    const auto at = kernels::cell_entries(
+        records, static_cast<std::size_t>(incidence[k] / kCorners), kUnknowns, kTileLog2);
+    const int first = 3 * (incidence[k] % kCorners);
+    sum += Vec3<T>{at[first], at[first + 1], at[first + 2]};
+  }
+  return sum;
+}
+
+}  // namespace kerf::gpu
