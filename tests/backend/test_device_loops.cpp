@@ -32,18 +32,18 @@ std::vector<T> read(const DeviceArray<MirrorDevice, T>& array) {
 TEST(DeviceArray, KeepsWhatItHoldsAndGrowsGeometrically) {
   MirrorDevice device;
   DeviceArray<MirrorDevice, int> array(device);
-  array.upload(std::vector<int>{1, 2, 3, 4});
-  EXPECT_EQ(array.capacity(), 4u);  // the first time exactly
+  array.upload(std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8});
+  EXPECT_EQ(array.capacity(), 8u);  // the first time exactly
 
-  array.resize(5);
-  EXPECT_EQ(array.capacity(), 6u);
-  array.write(4, std::vector<int>{5});
+  array.resize(9);
+  EXPECT_EQ(array.capacity(), 10u);
+  array.write(8, std::vector<int>{9});
 
-  EXPECT_EQ(read(array), (std::vector<int>{1, 2, 3, 4, 5}));
+  EXPECT_EQ(read(array), (std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
   array.resize(2);
   EXPECT_EQ(read(array), (std::vector<int>{1, 2}));
-  EXPECT_EQ(device.counters().bytes_held, 6 * sizeof(int));
-  EXPECT_EQ(device.counters().bytes_most, 10 * sizeof(int));
+  EXPECT_EQ(device.counters().bytes_held, 10 * sizeof(int));
+  EXPECT_EQ(device.counters().bytes_most, 18 * sizeof(int));
 }
 
 TEST(DeviceArray, GivesItsMemoryBack) {
