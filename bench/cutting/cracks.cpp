@@ -74,8 +74,16 @@ double opening_error(const StaticProblem& problem, const Vec3d& normal, const Pe
   return std::sqrt(error2 / exact2);
 }
 
+/// Of the crack, as the cut made it: of its two sides, seen along the normal.
+double cut_area(const StaticProblem& problem, const Vec3d& normal) {
+  double out = 0;
+  for (const CutFace& face : cut_faces(problem.body()))
+    out += 0.5 * std::abs(dot(face.normal, normal)) * face.area;
+  return out;
+}
+
 struct CrackResult {
-  double volume = 0;  // of the whole crack, m^3
+  double volume = 0, area = 0;  // of the whole crack, m^3, m^2
   double opening_error = 0, work = 0, h = 0;
   Cost cost;
 };
@@ -88,6 +96,7 @@ CrackResult open_crack(const CrackBody& body, Method method, int size, int threa
   CrackResult out;
   out.work = problem.half_work() / body.part();
   out.volume = 2 * out.work / kPressure;
+  out.area = cut_area(problem, body.normal()) / body.part();
   out.opening_error = opening_error(problem, body.normal(), exact);
   out.cost = problem.cost();
   out.h = problem.body().hierarchy.spacing;
@@ -103,6 +112,8 @@ Record penny_crack(Method method, int size, int threads) {
   Record out;
   out.value = found.volume;
   out.exact = exact.volume();
+  out.parts = {{"volume", out.value, out.exact},
+               {"area", found.area, std::numbers::pi * kRadius * kRadius}};
   out.error = found.opening_error;
   out.set_energy(found.work, exact.energy());
   out.cost = found.cost;

@@ -9,7 +9,10 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-double shear_modulus(const Elastic& m) { return m.young / (2 * (1 + m.poisson)); }
+double shear_stiffness(const Beam& beam) {
+  const double nu = beam.material.poisson, kappa = 10 * (1 + nu) / (12 + 11 * nu);
+  return kappa * beam.width * beam.height * beam.material.young / (2 * (1 + nu));
+}
 
 Vec3d any_across(const Vec3d& n) {
   const Vec3d other = std::abs(n.y) < 0.5 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0};
@@ -29,18 +32,16 @@ double HangingBar::energy() const {
   return area * weight * weight * std::pow(length, 3) / (6 * material.young);
 }
 
-double SquareBeam::tip() const {
-  const double q = weight * side * side, inertia = std::pow(side, 4) / 12;
-  const double nu = material.poisson, kappa = 10 * (1 + nu) / (12 + 11 * nu);
-  return q * std::pow(length, 4) / (8 * material.young * inertia) +
-         q * length * length / (2 * kappa * side * side * shear_modulus(material));
+double Beam::tip() const {
+  const double load = weight * width * height, inertia = width * std::pow(height, 3) / 12;
+  return load * std::pow(length, 4) / (8 * material.young * inertia) +
+         load * length * length / (2 * shear_stiffness(*this));
 }
 
-double SquareBeam::energy() const {
-  const double q = weight * side * side, inertia = std::pow(side, 4) / 12;
-  const double nu = material.poisson, kappa = 10 * (1 + nu) / (12 + 11 * nu);
-  return q * q * std::pow(length, 5) / (40 * material.young * inertia) +
-         q * q * std::pow(length, 3) / (6 * kappa * side * side * shear_modulus(material));
+double Beam::energy() const {
+  const double load = weight * width * height, inertia = width * std::pow(height, 3) / 12;
+  return load * load * std::pow(length, 5) / (40 * material.young * inertia) +
+         load * load * std::pow(length, 3) / (6 * shear_stiffness(*this));
 }
 
 // K = sqrt(12) P (a + 0.673 h) / h^1.5, energy release K^2 / E', and d(compliance)/da is twice

@@ -23,12 +23,13 @@ struct HangingBar {
   double energy() const;  ///< J
 };
 
-/// A clamped beam of square section under its own weight across it: bending and shear. It leaves
-/// out what the clamp does to the section, of order (side / length)^2.
+/// A clamped beam of rectangular section under its own weight across it: bending and shear. It
+/// leaves out what the clamp does to the section, of order (height / length)^2.
 /// Source  [TG70] article 21; Cowper 1966 [C66] for the shear coefficient of a rectangle.
-struct SquareBeam {
-  double length = 1, side = 1;  ///< m
-  double weight = 1;            ///< N/m^3
+struct Beam {
+  double length = 1;             ///< m
+  double height = 1, width = 1;  ///< m, along the weight and across
+  double weight = 1;             ///< N/m^3
   Elastic material;
 
   double tip() const;     ///< m

@@ -109,7 +109,8 @@ class Plot {
   }
 
   std::string draw() {
-    const std::vector<std::string> all = scenes_of(records_);
+    std::vector<std::string> all = scenes_of(records_);
+    std::erase_if(all, [&](const std::string& scene) { return !has_errors(scene); });
     const double width = kLeft + 2 * (kWidth + kGap) + kLegend;
     const double height = kTop + static_cast<double>(all.size()) * (kHeight + kGap);
     out_ << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << width << "\" height=\""
@@ -135,6 +136,12 @@ class Plot {
   }
 
  private:
+  // Above what the linear solver leaves.
+  static bool has_error(const Record& r) { return r.error > 1e-8; }
+  bool has_errors(const std::string& scene) const {
+    return std::any_of(records_.begin(), records_.end(),
+                       [&](const Record& r) { return r.scene == scene && has_error(r); });
+  }
   void label(double x, double y, const char* anchor, const std::string& words) {
     out_ << "<text x=\"" << x << "\" y=\"" << y << "\" text-anchor=\"" << anchor << "\">" << words
          << "</text>\n";
@@ -172,7 +179,7 @@ class Plot {
   void panel(const std::string& scene, const char* against, double left, double top, const Of& of) {
     Axis x, y;
     for (const Record& r : records_) {
-      if (r.scene != scene || !(r.error > 0)) continue;
+      if (r.scene != scene || !has_error(r)) continue;
       x.add(of(r));
       y.add(r.error);
     }
@@ -187,7 +194,7 @@ class Plot {
       double px = 0, py = 0;
       bool first = true;
       for (const Record& r : records_) {
-        if (r.scene != scene || r.method != methods_[m] || !(r.error > 0)) continue;
+        if (r.scene != scene || r.method != methods_[m] || !has_error(r)) continue;
         const double cx = left + x.at(of(r)), cy = top + kHeight - y.at(r.error);
         if (!first) line(px, py, cx, cy, kColours[m % std::size(kColours)]);
         circle(cx, cy, m, text(r.method, ", size ", r.size, ": ", r.error));

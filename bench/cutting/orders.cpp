@@ -36,12 +36,15 @@ Answer deflection(const Shape& shape, Method method, int threads, Record& out) {
 }
 
 /// Two blades each in two oblique directions, as in [DGW11] section 8.2, down to the middle of the
-/// cube, and one that is tilted and crosses them. It is smaller than a rod between them, so that
-/// nothing comes off.
+/// cube; one beside the first, nearer than a cell of the smaller sizes; and one that is tilted and
+/// crosses them. That is smaller than a rod between them, so that nothing comes off.
 std::vector<TriangleMesh> blades() {
-  constexpr double kTurn = 0.5, kDepth = 0.5;  // rad
+  constexpr double kTurn = 0.5, kDepth = 0.5, kBesideFirst = 0.04;
   std::vector<TriangleMesh> out = scenes::comb(1, 2, kDepth, kTurn);
-  out.push_back(plane_blade({0.4, 0.65, 0.45}, {0.6, 0.8, 0}, 0.12));
+  TriangleMesh second = out[0];
+  for (Vec3d& p : second.points) p += kBesideFirst * Vec3d{std::cos(kTurn), 0, std::sin(kTurn)};
+  out.push_back(second);
+  out.push_back(plane_blade({0.65, 0.65, 0.55}, {0.6, 0.8, 0}, 0.12));
   return out;
 }
 

@@ -26,8 +26,10 @@ const Record* find(const std::vector<Record>& all, const Record& like, int below
   return out;
 }
 
+// Errors of the linear solver have no order.
 double order_between(double coarse, double fine, double ratio) {
-  return coarse > 0 && fine > 0 ? std::log(coarse / fine) / std::log(ratio) : kNone;
+  constexpr double kSolved = 1e-8;
+  return coarse > kSolved && fine > kSolved ? std::log(coarse / fine) / std::log(ratio) : kNone;
 }
 
 Json cost_of(const Record& r) {

@@ -27,7 +27,8 @@ Record run_scene(const Scene& scene, Method method, int size, int threads);
 // One function for each scene; `value` is in m unless said otherwise.
 Record bar_on_grid(Method method, int size, int threads);
 Record bar_between(Method method, int size, int threads);
-Record rods(Method method, int size, int threads);
+Record rods_on_grid(Method method, int size, int threads);
+Record rods_between(Method method, int size, int threads);
 Record double_cantilever(Method method, int size, int threads);
 Record penny_crack(Method method, int size, int threads);   ///< value: its volume, m^3
 Record tilted_crack(Method method, int size, int threads);  ///< value: mean volume, m^3
