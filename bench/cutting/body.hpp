@@ -57,7 +57,7 @@ struct CutBody {
 };
 
 /// Source  Octree and links: [DGW11] section 4. Deletion: [WWD15] section 2.2.2. Virtual nodes:
-///         Molino, Bao, Fedkiw 2004, there on tetrahedra.
+///         Molino, Bao, Fedkiw 2004 [MBF04], there on tetrahedra.
 CutBody make_body(const Shape& shape, Method method);
 
 /// Whether a triangle meets the inside of a box.

@@ -12,7 +12,7 @@
 namespace kerf::cutting {
 
 /// A prism under its own weight, held at one end by what its exact solution does there. Exact.
-/// Source  Timoshenko, Goodier 1970 [TG70], article 96.
+/// Source  Timoshenko, Goodier 1970 [TG70], chapter 9.
 struct HangingBar {
   double length = 1, area = 1;  ///< m, m^2
   double weight = 1;            ///< N/m^3, away from the held end; negative: it stands on it
@@ -52,7 +52,7 @@ struct DoubleCantilever {
 /// A circular crack under inner pressure in an infinite body. Exact.
 /// Source  Sneddon 1946 [S46] for the opening. The displacement elsewhere is the sum of what each
 ///         part of the opening does, by the reciprocal theorem and Kelvin's point force, [TG70]
-///         article 135.
+///         chapter 12.
 class PennyCrack {
  public:
   PennyCrack(const Vec3d& normal, double radius, double pressure, const Elastic& material);

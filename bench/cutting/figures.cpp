@@ -7,11 +7,14 @@
 #include <fstream>
 #include <iomanip>
 #include <sstream>
+#include <utility>
 
 #include "core/base/error.hpp"
 
 namespace kerf::cutting {
 namespace {
+
+constexpr double kSolved = 1e-8;  // what the linear solver leaves is less
 
 // ---- tables
 
@@ -57,25 +60,76 @@ void scene_table(const std::vector<Record>& records, const std::string& scene,
   }
 }
 
-// The same size of both.
-void compare_octree(const std::vector<Record>& records, std::ostringstream& out) {
-  out << "\n### Octree against the uniform grid\n\n"
-         "| scene | size | cells | error, uniform | error, octree | s | of these, solve |\n"
-         "|---|---|---|---|---|---|---|\n";
-  for (const Record& octree : records) {
-    if (octree.method != name_of(Method::octree)) continue;
-    for (const Record& grid : records) {
-      if (grid.method != name_of(Method::uniform) || grid.scene != octree.scene ||
-          grid.size != octree.size)
-        continue;
-      const auto ratio = [](double a, double b) { return number("%.2f", a / b); };
-      out << "| " << grid.scene << " | " << grid.size << " | "
-          << ratio(static_cast<double>(octree.cost.cells), static_cast<double>(grid.cost.cells))
-          << " | " << number("%.2e", grid.error) << " | " << number("%.2e", octree.error) << " | "
-          << ratio(octree.cost.seconds(), grid.cost.seconds()) << " | "
-          << ratio(octree.cost.solve, grid.cost.solve) << " |\n";
+/// What a method needs for an error, between two of its sizes; no number beyond them.
+struct Need {
+  double cells = kNone, seconds = kNone;
+};
+
+Need need_for(double error, const std::string& scene, const std::string& method,
+              const std::vector<Record>& records) {
+  const Record* before = nullptr;  // of the size below
+  for (const Record& r : records) {
+    if (r.scene != scene || r.method != method) continue;
+    if (before != nullptr && before->error >= error && error >= r.error && r.error > 0) {
+      const double part = std::log(before->error / error) / std::log(before->error / r.error);
+      const auto between = [&](double a, double b) { return a * std::pow(b / a, part); };
+      return {between(static_cast<double>(before->cost.cells), static_cast<double>(r.cost.cells)),
+              between(before->cost.seconds(), r.cost.seconds())};
     }
+    before = &r;
   }
+  return {};
+}
+
+// The largest size of both, and what the octree needs for the error of the grid one size below.
+void compare_octree(const std::vector<Record>& records, std::ostringstream& out) {
+  const std::string grid = name_of(Method::uniform), octree = name_of(Method::octree);
+  out << "\n### Octree against the uniform grid\n\n"
+         "| scene | size | cells | bytes | s | s to solve | error | error of the grid with half "
+         "the size "
+         "| cells for it | s for it |\n|---|---|---|---|---|---|---|---|---|---|\n";
+  const auto ratio = [](double a, double b) { return number("%.2f", a / b); };
+  for (const std::string& scene : scenes_of(records)) {
+    const Record *a = nullptr, *b = nullptr, *half = nullptr;
+    for (const Record& r : records) {
+      if (r.scene != scene) continue;
+      if (r.method == octree) b = &r;
+      if (r.method == grid) half = std::exchange(a, &r);
+    }
+    if (a == nullptr || b == nullptr || half == nullptr || a->size != b->size) continue;
+    const Need need = need_for(half->error, scene, octree, records);
+    out << "| " << scene << " | " << a->size << " | "
+        << ratio(static_cast<double>(b->cost.cells), static_cast<double>(a->cost.cells)) << " | "
+        << ratio(b->cost.bytes, a->cost.bytes) << " | "
+        << ratio(b->cost.seconds(), a->cost.seconds()) << " | "
+        << ratio(b->cost.solve, a->cost.solve) << " | "
+        << (a->error > kSolved ? ratio(b->error, a->error) : "") << " | "
+        << number("%.1e", half->error) << " | "
+        << ratio(need.cells, static_cast<double>(half->cost.cells)) << " | "
+        << ratio(need.seconds, half->cost.seconds()) << " |\n";
+  }
+}
+
+// The largest size of each.
+void phase_table(const std::vector<Record>& records, std::ostringstream& out) {
+  constexpr double kMiB = 1 << 20;
+  out << "\n### Seconds by phase, and memory\n\n"
+         "| scene | method | cells | octree | cut | structure | values | solve | cycles | MiB held "
+         "| "
+         "MiB at most |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const std::string& scene : scenes_of(records))
+    for (const std::string& method : methods_of(records)) {
+      const Record* last = nullptr;
+      for (const Record& r : records)
+        if (r.scene == scene && r.method == method) last = &r;
+      if (last == nullptr) continue;
+      const Cost& c = last->cost;
+      out << "| " << scene << " | " << method << " | " << c.cells;
+      for (const double seconds : {c.octree, c.cut, c.structure, c.values, c.solve})
+        out << " | " << number("%.2f", seconds);
+      out << " | " << c.cycles << " | " << number("%.0f", c.bytes / kMiB) << " | "
+          << number("%.0f", c.peak_bytes / kMiB) << " |\n";
+    }
 }
 
 // ---- plots; all lengths in pixels
@@ -136,8 +190,7 @@ class Plot {
   }
 
  private:
-  // Above what the linear solver leaves.
-  static bool has_error(const Record& r) { return r.error > 1e-8; }
+  static bool has_error(const Record& r) { return r.error > kSolved; }
   bool has_errors(const std::string& scene) const {
     return std::any_of(records_.begin(), records_.end(),
                        [&](const Record& r) { return r.scene == scene && has_error(r); });
@@ -215,6 +268,7 @@ class Plot {
 std::string markdown_tables(const std::vector<Record>& records) {
   std::ostringstream out;
   for (const std::string& scene : scenes_of(records)) scene_table(records, scene, out);
+  phase_table(records, out);
   compare_octree(records, out);
   return out.str();
 }
