@@ -79,6 +79,7 @@ int measure(const Options& options) {
   };
   save();
   Progress progress;
+  int status = kDone;
   print_head();
   for (const std::string& name : options.scenes) {
     const Scene& scene = find_scene(name);
@@ -86,15 +87,25 @@ int measure(const Options& options) {
     if (options.smallest) sizes = {scene.sizes.front()};
     for (const Method method : options.methods)
       for (const int size : sizes) {
-        progress.show(text("kerf_cutting: ", name, ", ", name_of(method), ", ", size));
-        records.push_back(run_scene(scene, method, size, options.threads));
+        const std::string what = text("kerf_cutting: ", name, ", ", name_of(method), ", ", size);
+        progress.show(what);
+        try {
+          records.push_back(run_scene(scene, method, size, options.threads));
+        } catch (const Error& error) {
+          if (error.kind() != ErrorKind::bad_input) throw;
+          // At some sizes a blade takes off a piece that nothing holds; the others can still run.
+          progress.clear();
+          std::fprintf(stderr, "%s: left out: %s\n", what.c_str(), error.what());
+          status = kBadInput;
+          continue;
+        }
         add_orders(records);
         progress.clear();
         print_row(records.back());
         save();
       }
   }
-  return kDone;
+  return status;
 }
 
 int run(int argc, char** argv) {

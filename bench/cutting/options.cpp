@@ -143,7 +143,7 @@ std::string usage() {
          "  --machine NAME  for the key of that name (default: from the processor)\n"
          "\n"
          "A list is names with commas between, or `all`.\n"
-         "Exit status: 0 done; 2 bad input; 4 out of memory.\n";
+         "Exit status: 0 done; 2 bad input, or a size that a scene cannot have; 4 out of memory.\n";
 }
 
 std::string listing() {
