@@ -330,6 +330,7 @@ template <class S>
 std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int d, int q, int r) {
   using V = Vec3<Pack<double>>;
   expects_exact(d, q);
+  expects_exact(r, r);
   settle();
   FastLevel<S>& l = levels_[0];
   double *to = l.vectors[d].exact.data(), *product = l.vectors[q].exact.data();

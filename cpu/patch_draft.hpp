@@ -4,9 +4,11 @@
 // arrays of the level.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <exception>
 #include <memory>
 #include <new>
 #include <tuple>
@@ -38,7 +40,7 @@ struct Draft {
   std::uint16_t nothing() const { return static_cast<std::uint16_t>(points() - 1); }
 };
 
-/// Zeros, one for each of many numbers; those never touched cost nothing.
+/// Zeros, one for each of many numbers; of large bodies, those never touched cost nothing.
 class Marks {
  public:
   explicit Marks(std::size_t size)
@@ -53,6 +55,34 @@ class Marks {
   };
   std::unique_ptr<std::int32_t[], Free> marks_;
 };
+
+/// Runs body(i, local) for i from begin to end on some threads, each with a `local` of its own that
+/// make() gives. What they throw, one of them at least, is thrown here.
+template <class Make, class Body>
+void for_patches(std::int32_t begin, std::int32_t end, int threads, const Make& make,
+                 const Body& body) {
+  std::exception_ptr error;
+  const auto guarded = [&](const auto& part) {
+    try {
+      part();
+    } catch (...) {
+#pragma omp critical(kerf_patch_error)
+      error = std::current_exception();
+    }
+  };
+  if (begin >= end) return;
+#pragma omp parallel num_threads(std::min(threads, end - begin)) if (end - begin > 1)
+  {
+    decltype(make()) local{};
+    guarded([&] { local = make(); });
+#pragma omp for schedule(dynamic, 1)
+    for (std::int32_t i = begin; i < end; ++i)
+      guarded([&] {
+        if (local) body(i, *local);
+      });
+  }
+  if (error) std::rethrow_exception(error);
+}
 
 /// The points of one patch after the other.
 class Numbering {

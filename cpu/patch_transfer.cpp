@@ -2,6 +2,7 @@
 #include "cpu/patch_transfer.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 
 #include "kernels/transfer.hpp"
@@ -166,12 +167,9 @@ void place_transfers(const std::vector<std::int32_t>& patches, const Level& next
   const auto count = size_of(patches.size());
   const FirstCells first(*level.level);
   std::vector<TransferDraft> drafts(patches.size());
-#pragma omp parallel num_threads(threads) if (count > 1)
-  {
-    TransferRows rows(level, next, first);
-#pragma omp for schedule(dynamic, 1)
-    for (std::int32_t i = 0; i < count; ++i) drafts[i] = rows(patches[i]);
-  }
+  for_patches(
+      0, count, threads, [&] { return std::make_unique<TransferRows>(level, next, first); },
+      [&](std::int32_t i, TransferRows& rows) { drafts[i] = rows(patches[i]); });
   t.parts.resize(level.patches.size());
   if (!anew) {
     Rows givers(t.giver_begin, t.givers, t.giver_rows);

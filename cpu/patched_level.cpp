@@ -2,6 +2,7 @@
 #include "cpu/patched_level.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 #include <utility>
 
@@ -19,12 +20,10 @@ std::size_t bytes_of(const std::vector<T>& array) {
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
-constexpr std::int32_t kMostCells = 4096;  // of a patch, when it is made
-
 /// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kLeast = 256, kPatches = 16;
-  std::int32_t size = kMostCells;
+  constexpr std::int32_t kMost = 4096, kLeast = 256, kPatches = 16;
+  std::int32_t size = kMost;
   while (size > kLeast && cells < kPatches * size) size /= 2;
   return size;
 }
@@ -47,7 +46,7 @@ std::vector<std::vector<std::int32_t>> divide(const Level& level,
 std::int32_t claim(std::int32_t patch) { return -2 - patch; }
 
 template <class T>
-void put(const std::vector<T>& from, std::int32_t first, std::vector<T>& to) {
+void put(const std::vector<T>& from, std::ptrdiff_t first, std::vector<T>& to) {
   std::copy(from.begin(), from.end(), to.begin() + first);
 }
 
@@ -86,9 +85,14 @@ class Patcher {
     // A vertex of another patch alone is now shared with it, so that one changes too.
     for (std::size_t done = 0; done < drafts_.size();) {
       const std::size_t end = drafts_.size();
+      std::vector<std::int32_t> homes;
       for (; done < end; ++done)
         for (const std::int32_t v : drafts_[done].vertices)
-          if (const std::int32_t home = home_of(v); home >= 0 && !dirty_[home]) draft_patch(home);
+          if (const std::int32_t home = home_of(v); home >= 0 && !dirty_[home]) {
+            dirty_[home] = true;
+            homes.push_back(home);
+          }
+      for (const std::int32_t home : homes) draft_patch(home);
       make_drafts(end);
     }
     std::sort(drafts_.begin(), drafts_.end(),
@@ -205,8 +209,9 @@ class Patcher {
     for (std::int32_t lane = kGroup * groups.first; lane < kGroup * groups.end(); ++lane)
       if (out_.cell[lane] >= 0) cells.push_back(out_.cell[lane]);
     cells.insert(cells.end(), arrived_[p].begin(), arrived_[p].end());
-    if (size_of(cells.size()) <= kMostCells + kMostCells / 2) return add_draft(p, cells);
-    const auto parts = divide(level_, cells, kMostCells);
+    const std::int32_t most = patch_cells(level_.cells());
+    if (size_of(cells.size()) <= most + most / 2) return add_draft(p, cells);
+    const auto parts = divide(level_, cells, most);
     add_draft(p, parts[0]);
     for (std::size_t i = 1; i < parts.size(); ++i) add_patch(parts[i]);
     dirty_.resize(out_.patches.size(), true);
@@ -214,14 +219,10 @@ class Patcher {
   }
 
   void make_drafts(std::size_t begin) {
-    const std::int32_t count = size_of(drafts_.size());
-#pragma omp parallel num_threads(threads_) if (count - size_of(begin) > 1)
-    {
-      Numbering numbering(level_);
-#pragma omp for schedule(dynamic, 1)
-      for (std::int32_t i = size_of(begin); i < count; ++i)
-        make_draft(level_, drafts_[i], numbering);
-    }
+    for_patches(
+        size_of(begin), size_of(drafts_.size()), threads_,
+        [&] { return std::make_unique<Numbering>(level_); },
+        [&](std::int32_t i, Numbering& numbering) { make_draft(level_, drafts_[i], numbering); });
   }
 
   // --- vertices --------------------------------------------------------------------------------
@@ -403,10 +404,10 @@ class Patcher {
     const Patch& patch = out_.patches[draft.patch];
     const std::int32_t first = patch.groups.first;
     put(draft.cells, kGroup * first, out_.cell);
-    put(draft.corners, 8 * kGroup * first, out_.corners);
+    put(draft.corners, 8 * kGroup * std::ptrdiff_t{first}, out_.corners);
     put(draft.kind, first, out_.kind);
     put(draft.row, first, out_.row);
-    put(draft.slots, 8 * kGroup * patch.folded.first, out_.slots);
+    put(draft.slots, 8 * kGroup * std::ptrdiff_t{patch.folded.first}, out_.slots);
     std::int32_t slots = patch.folded.first;
     for (std::size_t g = 0; g < draft.folded.size(); ++g) {
       out_.slots_at[static_cast<std::size_t>(first) + g] = draft.folded[g] != 0 ? slots++ : -1;
@@ -450,6 +451,7 @@ class Patcher {
     copies.pack_if_wasteful();
   }
 
+  // Ranges that were just made have no gaps.
   void list_all_copies() {
     out_.copies_begin.assign(static_cast<std::size_t>(out_.shared) + 1, 0);
     for (const std::int32_t v : out_.copy_vertex)
@@ -508,6 +510,34 @@ class Patcher {
 
 }  // namespace
 
+PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
+                          int threads) {
+  PatchedLevel out;
+  Patcher(hierarchy, index, finer, threads, out).make();
+  return out;
+}
+
+namespace {
+
+/// The same for a level whose arrays have become long beside what is in them.
+PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change, std::size_t index,
+                          const PatchedLevel* finer, int threads, PatchedLevel& level) {
+  const PatchedLevel before = std::move(level);
+  level = make_patches(hierarchy, index, finer, threads);
+  PatchMoves moves;
+  for (std::size_t v = 0; v < before.packed.size(); ++v)
+    moves.vertices.push_back({before.packed[v], level.packed[v]});
+  for (std::int32_t c = 0; c < level.level->cells(); ++c) {
+    const std::int32_t old = change.cells_before;
+    moves.cells.push_back({before.lane[c < old ? c : change.origin[c - old]], c});
+    moves.held.push_back(c);
+  }
+  for (const Patch& patch : level.patches) moves.groups.push_back(patch.groups);
+  return moves;
+}
+
+}  // namespace
+
 void Range::fit(std::size_t count, std::int32_t& end) {
   size = size_of(count);
   if (size <= room) return;
@@ -525,30 +555,6 @@ std::size_t PatchedLevel::bytes() const {
          bytes_of(hanging_point) + bytes_of(hanging_masters) + bytes_of(shared_tiles) +
          bytes_of(copies_begin) + bytes_of(copies_of) + bytes_of(copy_rows.count) +
          transfer.bytes() + bytes_of(held) + bytes_of(children);
-}
-
-PatchedLevel make_patches(const Hierarchy& hierarchy, std::size_t index, const PatchedLevel* finer,
-                          int threads) {
-  PatchedLevel out;
-  Patcher(hierarchy, index, finer, threads, out).make();
-  return out;
-}
-
-/// The same for a level whose arrays have become long beside what is in them.
-PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change, std::size_t index,
-                          const PatchedLevel* finer, int threads, PatchedLevel& level) {
-  const PatchedLevel before = std::move(level);
-  level = make_patches(hierarchy, index, finer, threads);
-  PatchMoves moves;
-  for (std::size_t v = 0; v < before.packed.size(); ++v)
-    moves.vertices.push_back({before.packed[v], level.packed[v]});
-  for (std::int32_t c = 0; c < level.level->cells(); ++c) {
-    const std::int32_t old = change.cells_before;
-    moves.cells.push_back({before.lane[c < old ? c : change.origin[c - old]], c});
-    moves.held.push_back(c);
-  }
-  for (const Patch& patch : level.patches) moves.groups.push_back(patch.groups);
-  return moves;
 }
 
 PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,

@@ -4,9 +4,10 @@
 // its own short numbers for the points of its cells, so that a product with the matrix of a patch
 // runs in the cache and adds in a fixed order, whichever thread does it.
 //
-// Vertices  are numbered anew ("packed"): those that only one patch has, patch by patch, then those
-//           that patches share; vectors hold tiles of eight vertices, [tile][component][8]. What
-//           is left of a tile is nothing, which is zero and stays so.
+// Vertices  are numbered anew ("packed"), in tiles of eight: a tile has vertices of one patch
+// alone, or
+//           shared ones; one that was shared stays so. Vectors are [tile][component][8]. What is
+//           left of a tile is nothing, which is zero and stays so.
 // Points    of a patch: its vertices, its hanging corners, and last one that is nothing. A hanging
 //           corner is the mean of four of the points (each of two counts twice on an edge).
 // Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
@@ -36,10 +37,10 @@ enum StoredKind : std::uint16_t {
   kMerged,  ///< from children without held components, one an octant
   kPassed,  ///< from one cell of the same place and size, without held components
   // Where some cell of level 0 below is partly held:
-  kHeldMerged,  ///< from children above level 0, one an octant
-  kHeldPassed,  ///< from one cell above level 0
-  kGeneral,     ///< from cells of level 0, or two children have one octant
-  kNoCells
+  kHeldMerged,       ///< from children above level 0, one an octant
+  kHeldPassed,       ///< from one cell above level 0
+  kGeneral,          ///< from cells of level 0, or two children have one octant
+  kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
 
 /// Whether components of the vertices of a cell are held. A wholly held cell takes no part in any
@@ -53,8 +54,8 @@ enum RowKind : std::uint8_t {
   kRow       ///< the whole group is one
 };
 
-/// The part of an array that belongs to one patch. What lies between its size and its room is
-/// nothing.
+/// The part of an array that belongs to one patch. What lies between its size and its room is not
+/// read.
 struct Range {
   std::int32_t first = 0, size = 0, room = 0;
 

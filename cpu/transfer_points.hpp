@@ -13,6 +13,7 @@
 
 namespace kerf::cpu {
 
+/// At most one of a thread at a time: they share its buffers.
 template <class S>
 class TransferPoints {
  public:

@@ -119,7 +119,7 @@ class Rows {
   }
   std::int32_t room_at_end(std::size_t size) {
     const auto at = static_cast<std::int32_t>(items_.size());
-    items_.resize(items_.size() + std::max<std::size_t>(8, (size + 7) / 8 * 8));
+    items_.resize(items_.size() + (size + 7) / 8 * 8);
     return at;
   }
 

@@ -5,6 +5,8 @@
 // changed some of them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <utility>
 #include <vector>
 
@@ -130,8 +132,20 @@ class Followed {
 };
 
 struct Counts {
-  int updates = 0, remade = 0, untouched = 0;
+  int updates = 0, remade = 0, untouched = 0, divided = 0;
 };
+
+/// A few old vertices that lie together.
+std::vector<std::int32_t> some_vertices(const Level& level, test::Dice& dice) {
+  std::vector<std::int32_t> out;
+  const Vec3i& middle = level.point[dice.roll(level.vertices())];
+  for (std::int32_t v = 0; v < level.vertices(); ++v) {
+    int far = 0;
+    for (int d = 0; d < 3; ++d) far = std::max(far, std::abs(level.point[v][d] - middle[d]));
+    if (far <= 2) out.push_back(v);
+  }
+  return out;
+}
 
 void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& counts) {
   test::Dice dice(seed);
@@ -147,7 +161,11 @@ void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& coun
   for (int i = 0; i < blades; ++i) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ", blade " << i);
     const CutEvent event = cut(p.body, {}, random.next(), i + 1);
-    ASSERT_TRUE(p.update(updater, event));
+    std::vector<std::int32_t> turned;
+    if (i % 2 == 1) turned = some_vertices(p.hierarchy.levels[0], dice);
+    ASSERT_TRUE(p.update(updater, event, turned));
+    const std::size_t patches = one.levels()[0].patches.size();
+    const int remade = one.remade();
     const std::vector<std::int32_t> lanes = one.levels()[0].lane;
     one.update(updater.change());
     two.update(updater.change());
@@ -160,6 +178,7 @@ void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& coun
       ASSERT_EQ(one.levels()[l].transfer.givers, two.levels()[l].transfer.givers);
     }
     ++counts.updates;
+    counts.divided += one.remade() == remade && one.levels()[0].patches.size() > patches;
     for (std::size_t c = 0; c < lanes.size(); ++c)
       counts.untouched += lanes[c] == one.levels()[0].lane[c];
   }
@@ -172,6 +191,7 @@ TEST(Patches, StayWholeUnderCuts) {
     cut_and_follow(seed, static_cast<int>(seed % 3), 10, counts);
   EXPECT_EQ(counts.updates, 40);
   EXPECT_GT(counts.remade, 0);
+  EXPECT_GT(counts.divided, 0);
   EXPECT_GT(counts.untouched, 1000);
 }
 

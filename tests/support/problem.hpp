@@ -112,8 +112,10 @@ struct Problem {
       : Problem(scene(name), given) {}
 
   /// Brings the hierarchy, not the grids, up to date after a cut of the body; what is new is held
-  /// as its place says. Returns false if it would have another number of levels.
-  bool update(LevelUpdater& updater, const CutEvent& event) {
+  /// as its place says, and old vertices that are named (ascending) are held or free in turn.
+  /// Returns false if it would have another number of levels.
+  bool update(LevelUpdater& updater, const CutEvent& event,
+              const std::vector<std::int32_t>& turned = {}) {
     updater.update_finest(body, event, hierarchy);
     const LevelChange& change = updater.change().levels[0];
     Level& finest = hierarchy.levels[0];
@@ -128,8 +130,10 @@ struct Problem {
     for (const std::int32_t c : change.cells) hierarchy.values.set(c, value_of(c, c));
     for (std::int32_t v = change.vertices_before; v < finest.vertices(); ++v)
       finest.fixed[v] = options.holds != Holds::none && finest.point[v][0] == 0 ? 7 : 0;
+    for (const std::int32_t v : turned) finest.fixed[v] = finest.fixed[v] == 0 ? 7 : 0;
     return updater.update_coarse(
-        hierarchy, {options.coarsest_vertices, options.max_levels, options.duplicate_cells});
+        hierarchy, {options.coarsest_vertices, options.max_levels, options.duplicate_cells},
+        turned);
   }
 
   int levels() const { return static_cast<int>(hierarchy.levels.size()); }

@@ -148,8 +148,7 @@ inline Voxels random_body(Dice& dice) {
     case 2:
       return ball_body(12);
     case 3:
-      return make_voxels(lattice_of({12, 12, 12}),
-                               [](const Vec3i& c) { return c[1] < 5 ? 1 : 2; });
+      return make_voxels(lattice_of({12, 12, 12}), [](const Vec3i& c) { return c[1] < 5 ? 1 : 2; });
     default:
       return two_limb_body({12, 6, 14});
   }
