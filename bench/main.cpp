@@ -2,20 +2,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <cstdio>
-#include <new>
 #include <set>
 
 #include "app/commands.hpp"
-#include "app/version.hpp"
+#include "bench/command_line.hpp"
 #include "bench/compare.hpp"
-#include "bench/machine_name.hpp"
 #include "bench/measure.hpp"
 #include "bench/options.hpp"
 #include "bench/plot.hpp"
-#include "core/base/error.hpp"
 #include "gpu/cuda_backend.hpp"
 
 namespace {
@@ -40,8 +35,8 @@ class Console {
     clear();
     std::printf("%-16s %-19s %-10s %7d %-9s %10.4g %10.4g %11.4g %8s %7s %9s\n", r.scene.c_str(),
                 r.phase.c_str(), r.backend.c_str(), r.threads, r.precision.c_str(), r.ms_min,
-                r.ms_median, r.ns_per_cell, number("%.3g", r.gb_per_s).c_str(),
-                number("%.2g", r.of_ceiling).c_str(), number("%.2g", r.residual).c_str());
+                r.ms_median, r.ns_per_cell, formatted("%.3g", r.gb_per_s).c_str(),
+                formatted("%.2g", r.of_ceiling).c_str(), formatted("%.2g", r.residual).c_str());
     std::fflush(stdout);
   }
   void note(const std::string& line) {
@@ -58,12 +53,6 @@ class Console {
   }
 
  private:
-  static std::string number(const char* format, double value) {
-    if (std::isnan(value)) return "-";
-    char out[32];
-    std::snprintf(out, sizeof out, format, value);
-    return out;
-  }
   void clear() {
     if (shown_) std::fprintf(stderr, "\r\033[K");
     shown_ = false;
@@ -73,19 +62,12 @@ class Console {
   std::set<std::string> notes_;
 };
 
-std::string lower(std::string text_of) {
-  for (char& c : text_of) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text_of;
-}
-
 // Before anything is measured, so that a bad name is not found after an hour, and after each scene,
 // so that a run that is stopped leaves what it has.
 void save(const Options& options, std::vector<Row> all, const std::vector<Row>& rows) {
   if (options.csv.empty()) return;
   all.insert(all.end(), rows.begin(), rows.end());
-  write_csv(
-      options.csv, all,
-      {kCommit, lower(kBuildType), options.machine.empty() ? machine_name() : options.machine});
+  write_csv(options.csv, all, origin_of(options.machine));
 }
 
 int measure(const Options& options) {
@@ -134,20 +116,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto complain = [](const char* what, int status) {
-    std::fflush(stdout);
-    std::fprintf(stderr, "kerf_bench: error: %s\n", what);
-    return status;
-  };
-  try {
-    return run(argc, argv);
-  } catch (const Error& error) {
-    const bool bad_input = error.kind() == ErrorKind::bad_input;
-    const bool unavailable = error.kind() == ErrorKind::unavailable;
-    return complain(error.what(), bad_input ? kBadInput : unavailable ? kUnavailable : kInternal);
-  } catch (const std::bad_alloc&) {
-    return complain("out of memory; choose a smaller scene or fewer threads at once", kUnavailable);
-  } catch (const std::exception& error) {
-    return complain(error.what(), kInternal);
-  }
+  return run_program("kerf_bench", "choose a smaller scene or fewer threads at once",
+                     [&] { return run(argc, argv); });
 }

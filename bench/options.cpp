@@ -1,84 +1,26 @@
 // SPDX-License-Identifier: MIT
 #include "bench/options.hpp"
 
-#include <algorithm>
-#include <charconv>
 #include <functional>
 #include <iomanip>
 #include <map>
 #include <sstream>
-#include <string_view>
-#include <thread>
 
-#include "app/scene_toml.hpp"
 #include "bench/candidates.hpp"
+#include "bench/command_line.hpp"
 #include "bench/phases.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf::bench {
 namespace {
 
-using Names = std::vector<std::string>;
-
 constexpr const char* kAll = "all";
-
-Names split(std::string_view list) {
-  Names out(1);
-  for (const char c : list) {
-    if (c == ',')
-      out.emplace_back();
-    else
-      out.back() += c;
-  }
-  return out;
-}
-
-template <class Table>
-Names names_of(const Table& table) {
-  Names out;
-  for (const auto& entry : table) out.emplace_back(entry.name);
-  return out;
-}
 
 Names scene_names() {
   Names out = names_of(scenes());
   out.emplace_back("machine");  // the ceilings alone
   return out;
 }
-
-std::string unknown(const std::string& kind, const std::string& name, const Names& known) {
-  const std::string near = nearest_name(name, known);
-  if (!near.empty()) return text("no ", kind, " '", name, "'; did you mean '", near, "'?");
-  std::string all;
-  for (const std::string& one : known) all += (all.empty() ? "" : ", ") + one;
-  return text("no ", kind, " '", name, "'; there are: ", all);
-}
-
-// The names of a list, each once, in the order of `known`; all of them for "all".
-Names choose(const std::string& option, const std::string& kind, const std::string& list,
-             const Names& known) {
-  if (list == kAll) return known;
-  const Names given = split(list);
-  for (const std::string& name : given)
-    expects(std::find(known.begin(), known.end(), name) != known.end(),
-            text(option, ": ", unknown(kind, name, known)));
-  Names out;
-  for (const std::string& name : known)
-    if (std::find(given.begin(), given.end(), name) != given.end()) out.push_back(name);
-  return out;
-}
-
-template <class Number>
-Number number(const std::string& option, const std::string& value, Number least, Number most) {
-  Number out{};
-  const char* const end = value.data() + value.size();
-  const auto [stop, error] = std::from_chars(value.data(), end, out);
-  expects(error == std::errc() && stop == end && out >= least && out <= most,
-          text(option, " must be a number from ", least, " to ", most, ", not '", value, "'"));
-  return out;
-}
-
-int cores() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
 // Powers of two below the number of cores, and that number.
 std::vector<int> all_threads() {
@@ -90,11 +32,7 @@ std::vector<int> all_threads() {
 
 std::vector<int> choose_threads(const std::string& list) {
   if (list == kAll) return all_threads();
-  std::vector<int> out;
-  for (const std::string& one : split(list)) out.push_back(number("--threads", one, 1, 1024));
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
-  return out;
+  return numbers("--threads", list, 1024);
 }
 
 using Setter = std::function<void(Options&, const std::string&)>;
@@ -158,21 +96,7 @@ Options parse_options(int argc, const char* const* argv) {
   Options out;
   out.threads = {cores()};
   out.phases = names_of(phases());
-  for (int i = 1; i < argc; ++i) {
-    const std::string name = argv[i];
-    if (name == "--list" || name == "--help" || name == "-h") {
-      (name == "--list" ? out.list : out.help) = true;
-      continue;
-    }
-    const auto setter = setters().find(name);
-    if (setter == setters().end()) {
-      Names known{"--list", "--help"};
-      for (const auto& [option, set] : setters()) known.push_back(option);
-      throw Error(ErrorKind::bad_input, unknown("option", name, known));
-    }
-    expects(i + 1 < argc && argv[i + 1][0] != '\0', name + " needs a value");
-    setter->second(out, argv[++i]);
-  }
+  read_arguments(argc, argv, setters(), out);
   check(out);
   return out;
 }

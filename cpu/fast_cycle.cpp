@@ -55,6 +55,45 @@ struct ChebyshevSteps {
   }
 };
 
+/// One step, from value(tile, first lane): u as it was before it. In the second one, where the
+/// first was from zero, that is the direction too, and shared vertices have it put first.
+template <class S>
+template <class Value>
+void FastBackend<S>::chebyshev_step(int level, const Value& value, S keep, S take, StepKind kind,
+                                    bool last) {
+  using V = Vec3<Pack<S>>;
+  FastLevel<S>& l = levels_[level];
+  S *u = l.at(kSolution), *d = l.at(kDirection);
+  const S* f = l.at(kRight);
+  const S* correction = waiting_ == level ? levels_[level + 1].at(kSolution) : nullptr;
+  const auto start = [&](std::size_t patch) {
+    auto& points = transfer_here<S>();
+    if (correction == nullptr) return points.reset();
+    points.emplace(l.patched, patch);
+    points->load(levels_[level + 1].patched, correction);
+  };
+  sweep<S>(
+      level,
+      [&](std::size_t tile) {
+        if (kind != kSecond) return;
+        for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
+      },
+      start, value, u,
+      [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
+      [&](std::size_t tile, int first, const V& sum, const auto& before) {
+        const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
+        const V at = before();
+        V direction = Pack<S>(take) * l.times_inverse(tile, first, r);
+        if (kind == kSecond)
+          direction += Pack<S>(keep) * at;
+        else if (kind == kLater)
+          direction += Pack<S>(keep) * load_tile(static_cast<const S*>(d), tile, first);
+        if (!last) store_tile(d, tile, first, direction);
+        store_tile(u, tile, first, at + direction);
+        return Sums{};
+      });
+}
+
 // Chebyshev acceleration of block Jacobi on [smallest, 1] * bound; residual, direction and update
 // of a vertex in one pass behind the sum of what its cells add. From a zero guess the first step
 // needs no product: it is made on the fly where the second one reads it. A correction that waits is
@@ -62,11 +101,10 @@ struct ChebyshevSteps {
 // Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, algorithm 12.1.
 template <class S>
 void FastBackend<S>::chebyshev(int level) {
-  using V = Vec3<Pack<S>>;
   if (waiting_ != level) settle();
   FastLevel<S>& l = levels_[level];
   ChebyshevSteps steps(l.bound, smoother_.smallest * l.bound);
-  S *u = l.at(kSolution), *d = l.at(kDirection);
+  S* u = l.at(kSolution);
   const S* f = l.at(kRight);
   const S first_take = static_cast<S>(steps.first_take());
   const auto from_zero = [&](std::size_t tile, int first) {
@@ -76,36 +114,8 @@ void FastBackend<S>::chebyshev(int level) {
     return load_tile(static_cast<const S*>(u), tile, first) +
            masked(transfer_here<S>()->taken(tile, first), l.fixed(tile, first));
   };
-  const S* correction = waiting_ == level ? levels_[level + 1].at(kSolution) : nullptr;
-  const auto start = [&](std::size_t patch) {
-    auto& points = transfer_here<S>();
-    if (waiting_ != level) return points.reset();
-    points.emplace(l.patched, patch);
-    points->load(levels_[level + 1].patched, correction);
-  };
   const auto as_it_is = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first);
-  };
-  const auto step = [&](const auto& value, bool put, S keep, S take, bool keep_value, bool last) {
-    sweep<S>(
-        level,
-        [&](std::size_t tile) {
-          if (put) for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
-        },
-        start, value, u,
-        [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
-        [&](std::size_t tile, int first, const V& sum, const auto& before) {
-          const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
-          const V at = before();
-          V direction = Pack<S>(take) * l.times_inverse(tile, first, r);
-          if (keep_value)
-            direction += Pack<S>(keep) * at;
-          else if (keep != 0)
-            direction += Pack<S>(keep) * load_tile(static_cast<const S*>(d), tile, first);
-          if (!last) store_tile(d, tile, first, direction);
-          store_tile(u, tile, first, at + direction);
-          return Sums{};
-        });
   };
   const int degree = smoother_.degree;
   int done = 0;
@@ -116,14 +126,15 @@ void FastBackend<S>::chebyshev(int level) {
     done = 1;
   } else if (l.solution_is_zero) {
     const auto [keep, take] = steps.next();
-    step(from_zero, true, static_cast<S>(keep), static_cast<S>(take), true, degree == 2);
+    chebyshev_step(level, from_zero, static_cast<S>(keep), static_cast<S>(take), kSecond,
+                   degree == 2);
     done = 2;
   } else {
     if (waiting_ == level) {
       correct_shared(level);
-      step(corrected, false, S(0), first_take, false, degree == 1);
+      chebyshev_step(level, corrected, S(0), first_take, kFirst, degree == 1);
     } else {
-      step(as_it_is, false, S(0), first_take, false, degree == 1);
+      chebyshev_step(level, as_it_is, S(0), first_take, kFirst, degree == 1);
     }
     done = 1;
   }
@@ -131,7 +142,8 @@ void FastBackend<S>::chebyshev(int level) {
   l.solution_is_zero = false;
   for (; done < degree; ++done) {
     const auto [keep, take] = steps.next();
-    step(as_it_is, false, static_cast<S>(keep), static_cast<S>(take), false, done + 1 == degree);
+    chebyshev_step(level, as_it_is, static_cast<S>(keep), static_cast<S>(take), kLater,
+                   done + 1 == degree);
   }
 }
 

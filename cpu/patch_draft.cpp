@@ -2,6 +2,7 @@
 #include "cpu/patch_draft.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "core/base/error.hpp"
 #include "kernels/transfer.hpp"

@@ -11,7 +11,6 @@
 #include <exception>
 #include <memory>
 #include <new>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>

@@ -1,24 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <cstdio>
-#include <new>
 
 #include "app/commands.hpp"
-#include "app/version.hpp"
+#include "bench/command_line.hpp"
 #include "bench/cutting/figures.hpp"
 #include "bench/cutting/options.hpp"
 #include "bench/cutting/scenes.hpp"
-#include "bench/machine_name.hpp"
 #include "core/base/error.hpp"
 
 namespace {
 
 using namespace kerf;
 using namespace kerf::cutting;
+using bench::formatted;
 
 /// On a terminal, a line on standard error that says what runs.
 class Progress {
@@ -40,13 +36,6 @@ class Progress {
   bool terminal_;
 };
 
-std::string number(const char* format, double value) {
-  if (std::isnan(value)) return "-";
-  char out[32];
-  std::snprintf(out, sizeof out, format, value);
-  return out;
-}
-
 void print_head() {
   std::printf("%-13s %-14s %5s %9s %9s %10s %6s %10s %6s %9s %7s %6s\n", "scene", "method", "size",
               "cells", "unknowns", "error", "order", "energy_err", "order", "spread", "seconds",
@@ -57,20 +46,14 @@ void print_row(const Record& r) {
   constexpr double kMiB = 1 << 20;
   std::printf("%-13s %-14s %5d %9zu %9zu %10s %6s %10s %6s %9s %7.2f %6.1f\n", r.scene.c_str(),
               r.method.c_str(), r.size, r.cost.cells, r.cost.unknowns,
-              number("%.3e", r.error).c_str(), number("%.2f", r.order).c_str(),
-              number("%.3e", r.energy_error).c_str(), number("%.2f", r.energy_order).c_str(),
-              number("%.1e", r.spread).c_str(), r.cost.seconds(), r.cost.bytes / kMiB);
+              formatted("%.3e", r.error).c_str(), formatted("%.2f", r.order).c_str(),
+              formatted("%.3e", r.energy_error).c_str(), formatted("%.2f", r.energy_order).c_str(),
+              formatted("%.1e", r.spread).c_str(), r.cost.seconds(), r.cost.bytes / kMiB);
   std::fflush(stdout);
 }
 
-bench::Origin origin_of(const Options& options) {
-  std::string build = kBuildType;
-  for (char& c : build) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return {kCommit, build, options.machine.empty() ? bench::machine_name() : options.machine};
-}
-
 int measure(const Options& options) {
-  const bench::Origin origin = origin_of(options);
+  const bench::Origin origin = bench::origin_of(options.machine);
   std::vector<Record> records;
   // Before anything is run, so that a bad name is not found at the end, and after each run, so that
   // one that is stopped leaves what it has.
@@ -127,20 +110,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto complain = [](const char* what, int status) {
-    std::fflush(stdout);
-    std::fprintf(stderr, "kerf_cutting: error: %s\n", what);
-    return status;
-  };
-  try {
-    return run(argc, argv);
-  } catch (const Error& error) {
-    const bool bad_input = error.kind() == ErrorKind::bad_input;
-    const bool unavailable = error.kind() == ErrorKind::unavailable;
-    return complain(error.what(), bad_input ? kBadInput : unavailable ? kUnavailable : kInternal);
-  } catch (const std::bad_alloc&) {
-    return complain("out of memory; choose smaller --sizes", kUnavailable);
-  } catch (const std::exception& error) {
-    return complain(error.what(), kInternal);
-  }
+  return bench::run_program("kerf_cutting", "choose smaller --sizes",
+                            [&] { return run(argc, argv); });
 }

@@ -1,91 +1,48 @@
 // SPDX-License-Identifier: MIT
 #include "bench/cutting/options.hpp"
 
-#include <algorithm>
-#include <charconv>
+#include <functional>
 #include <iomanip>
 #include <map>
 #include <sstream>
-#include <thread>
 
-#include "app/scene_toml.hpp"
+#include "bench/command_line.hpp"
 #include "bench/cutting/scenes.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf::cutting {
 namespace {
 
-using Names = std::vector<std::string>;
-
-Names split(const std::string& list) {
-  Names out;
-  std::istringstream in(list + ",");
-  for (std::string one; std::getline(in, one, ',');) out.push_back(one);
-  return out;
-}
-
-template <class Table>
-Names names_of(const Table& table) {
-  Names out;
-  for (const auto& entry : table) out.emplace_back(entry.name);
-  return out;
-}
-
-std::string unknown(const std::string& kind, const std::string& name, const Names& known) {
-  const std::string near = nearest_name(name, known);
-  if (!near.empty()) return text("no ", kind, " '", name, "'; did you mean '", near, "'?");
-  std::string all;
-  for (const std::string& one : known) all += (all.empty() ? "" : ", ") + one;
-  return text("no ", kind, " '", name, "'; there are: ", all);
-}
-
-Names choose(const std::string& kind, const std::string& list, const Names& known) {
-  if (list == "all") return known;
-  Names out;
-  for (const std::string& name : split(list)) {
-    expects(std::find(known.begin(), known.end(), name) != known.end(), unknown(kind, name, known));
-    if (std::find(out.begin(), out.end(), name) == out.end()) out.push_back(name);
-  }
-  return out;
-}
-
-int number(const std::string& option, const std::string& value, int most) {
-  int out = 0;
-  const char* end = value.data() + value.size();
-  const auto [stop, error] = std::from_chars(value.data(), end, out);
-  expects(error == std::errc() && stop == end && out >= 1 && out <= most,
-          text(option, " must be a number from 1 to ", most, ", not '", value, "'"));
-  return out;
-}
+using bench::choose;
+using bench::names_of;
 
 void set_methods(Options& o, const std::string& list) {
   o.methods.clear();
-  const Names chosen = choose("method", list, names_of(methods()));
-  for (const std::string& name : chosen)
+  for (const std::string& name : choose("--method", "method", list, names_of(methods())))
     for (const MethodInfo& info : methods())
       if (name == info.name) o.methods.push_back(info.method);
 }
 
 void set_sizes(Options& o, const std::string& list) {
   constexpr int kMost = 1024;
-  o.sizes.clear();
   o.smallest = list == "smallest";
-  if (o.smallest) return;
-  for (const std::string& one : split(list)) o.sizes.push_back(number("--sizes", one, kMost));
-  std::sort(o.sizes.begin(), o.sizes.end());
-  o.sizes.erase(std::unique(o.sizes.begin(), o.sizes.end()), o.sizes.end());
+  o.sizes = o.smallest ? std::vector<int>() : bench::numbers("--sizes", list, kMost);
 }
 
-using Setter = void (*)(Options&, const std::string&);
+using Setter = std::function<void(Options&, const std::string&)>;
 
 const std::map<std::string, Setter>& setters() {
   static const std::map<std::string, Setter> all{
       {"--scene",
-       [](Options& o, const std::string& v) { o.scenes = choose("scene", v, names_of(scenes())); }},
+       [](Options& o, const std::string& v) {
+         o.scenes = choose("--scene", "scene", v, names_of(scenes()));
+       }},
       {"--method", set_methods},
       {"--sizes", set_sizes},
       {"--threads",
-       [](Options& o, const std::string& v) { o.threads = number("--threads", v, 1024); }},
+       [](Options& o, const std::string& v) {
+         o.threads = bench::number("--threads", v, 1, 1024);
+       }},
       {"--json", [](Options& o, const std::string& v) { o.json = v; }},
       {"--machine", [](Options& o, const std::string& v) { o.machine = v; }},
       {"--plot", [](Options& o, const std::string& v) { o.plot = v; }},
@@ -107,23 +64,9 @@ void check(const Options& o) {
 
 Options parse_options(int argc, const char* const* argv) {
   Options out;
-  out.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  out.threads = bench::cores();
   set_methods(out, "all");
-  for (int i = 1; i < argc; ++i) {
-    const std::string name = argv[i];
-    if (name == "--list" || name == "--help" || name == "-h") {
-      (name == "--list" ? out.list : out.help) = true;
-      continue;
-    }
-    const auto setter = setters().find(name);
-    if (setter == setters().end()) {
-      Names known{"--list", "--help"};
-      for (const auto& [option, set] : setters()) known.push_back(option);
-      throw Error(ErrorKind::bad_input, unknown("option", name, known));
-    }
-    expects(i + 1 < argc && argv[i + 1][0] != '\0', name + " needs a value");
-    setter->second(out, argv[++i]);
-  }
+  bench::read_arguments(argc, argv, setters(), out);
   check(out);
   return out;
 }

@@ -11,7 +11,7 @@
 #include "core/simulation.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/physics.hpp"
-#include "tests/support/problem.hpp"
+#include "tests/support/solves.hpp"
 
 namespace kerf {
 namespace {
@@ -20,6 +20,8 @@ using oracle::Vector;
 using test::Loaded;
 using test::Problem;
 using test::ProblemOptions;
+using test::relative;
+using test::Solved;
 
 constexpr OperatorScale kDynamic{0.8, 400};
 // Some ten roundings of single precision, of sums whose terms are as large as the largest entry.
@@ -29,10 +31,6 @@ constexpr double kCoded = 5e-5;
 constexpr double kCodedSmoothed = 2e-2;
 // Diagonal blocks are inverted; those of lone corners are ill-conditioned by a factor of tens.
 constexpr double kSmoothed = 1e-4;
-
-double relative(const Vector& found, const Vector& expected) {
-  return (found - expected).lpNorm<Eigen::Infinity>() / expected.lpNorm<Eigen::Infinity>();
-}
 
 /// A cut octree of three materials, with held components and hanging corners.
 Problem cut_octree() {
@@ -102,26 +100,10 @@ TEST(MixedPrecision, ForcesAndRotationsStayDouble) {
 }
 
 /// One solve by conjugate gradients with a K-cycle.
-struct Solved {
-  SolveStats stats;
-  Vector x;
-};
 Solved solve(const Problem& p, const std::string& machine, double tolerance, int threads = 1) {
   SolverSetup setup;
   setup.cycle = CycleType::k;
-  const auto backend = test::make_backend(machine, threads);
-  LinearSolver solver(*backend, setup);
-  const int b = backend->add_vector(), x = backend->add_vector();
-  backend->load(p.hierarchy);
-  solver.set_structure(p.hierarchy);
-  backend->set_operator(kDynamic);
-  test::write(*backend, 0, x, p.deformation());
-  backend->rotate_cells(x);
-  solver.refresh();
-  test::write(*backend, 0, b, p.free_vector(0, 101));
-  backend->zero(0, x);
-  const SolveStats stats = solver.solve(b, x, tolerance);
-  return {stats, p.read(*backend, 0, x)};
+  return test::solve(p, *test::make_backend(machine, threads), setup, kDynamic, tolerance);
 }
 
 TEST(MixedPrecision, SolvesToATrueResidualThatSinglePrecisionNeverSees) {
@@ -313,18 +295,7 @@ TEST(MixedPrecision, SolvesWhereCodedMatricesWouldBeIndefinite) {
   options.coarsest_vertices = 200;
   options.with_oracle = false;
   const Problem p(std::move(body), options);
-  const auto backend = test::make_backend("mixed");
-  LinearSolver solver(*backend, {});
-  const int b = backend->add_vector(), x = backend->add_vector();
-  backend->load(p.hierarchy);
-  solver.set_structure(p.hierarchy);
-  backend->set_operator(kDynamic);
-  test::write(*backend, 0, x, p.deformation());
-  backend->rotate_cells(x);
-  solver.refresh();
-  test::write(*backend, 0, b, p.free_vector(0, 101));
-  backend->zero(0, x);
-  const SolveStats stats = solver.solve(b, x, kTolerance);
+  const SolveStats stats = solve(p, "mixed", kTolerance).stats;
   EXPECT_TRUE(stats.converged);
   EXPECT_LE(stats.residual, kTolerance);
   EXPECT_LT(stats.cycles, 40);

@@ -12,7 +12,7 @@
 #include "core/simulation.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/physics.hpp"
-#include "tests/support/problem.hpp"
+#include "tests/support/solves.hpp"
 
 namespace kerf {
 namespace {
@@ -24,6 +24,8 @@ using test::make_mirror_backend;
 using test::MirrorOptions;
 using test::Problem;
 using test::ProblemOptions;
+using test::relative;
+using test::Solved;
 using test::ThreadOrder;
 
 constexpr OperatorScale kDynamic{0.8, 400};
@@ -33,10 +35,6 @@ constexpr double kDouble = 1e-12;
 constexpr double kSingle = 1e-5;
 // Diagonal blocks are inverted; those of lone corners are ill-conditioned by a factor of tens.
 constexpr double kSmoothed = 2e-4;
-
-double relative(const Vector& found, const Vector& expected) {
-  return (found - expected).lpNorm<Eigen::Infinity>() / expected.lpNorm<Eigen::Infinity>();
-}
 
 /// A cut octree of three materials, with held components and hanging corners.
 Problem cut_octree() {
@@ -205,32 +203,12 @@ TEST_P(Parity, OfVectorsAndParts) {
 
 // ---- whole solves ------------------------------------------------------------------------------
 
-struct Solved {
-  SolveStats stats;
-  std::vector<double> history;
-  Vector x;
-};
 Solved solve(const Problem& p, std::unique_ptr<Backend> machine, CycleType cycle, double tolerance,
              bool chebyshev = true) {
   SolverSetup setup;
   setup.cycle = cycle;
   setup.smoother = chebyshev ? SmootherType::chebyshev : SmootherType::gauss_seidel;
-  Backend& backend = *machine;
-  LinearSolver solver(backend, setup);
-  Solved out;
-  solver.on_progress([&](int, double residual) { out.history.push_back(residual); });
-  const int b = backend.add_vector(), x = backend.add_vector();
-  backend.load(p.hierarchy);
-  solver.set_structure(p.hierarchy);
-  backend.set_operator(kDynamic);
-  test::write(backend, 0, x, p.deformation());
-  backend.rotate_cells(x);
-  solver.refresh();
-  test::write(backend, 0, b, p.free_vector(0, 101));
-  backend.zero(0, x);
-  out.stats = solver.solve(b, x, tolerance);
-  out.x = p.read(backend, 0, x);
-  return out;
+  return test::solve(p, *machine, setup, kDynamic, tolerance);
 }
 
 TEST_P(Parity, OfResidualHistories) {

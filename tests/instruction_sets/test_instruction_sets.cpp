@@ -10,8 +10,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
-#include "core/solve/linear_solver.hpp"
-#include "tests/support/problem.hpp"
+#include "tests/support/solves.hpp"
 
 namespace kerf {
 namespace {
@@ -60,18 +59,9 @@ Problem cut_octree() {
 Vector solve(const Problem& p, std::unique_ptr<Backend> backend, double tolerance) {
   SolverSetup setup;
   setup.cycle = CycleType::k;
-  LinearSolver solver(*backend, setup);
-  const int b = backend->add_vector(), x = backend->add_vector();
-  backend->load(p.hierarchy);
-  solver.set_structure(p.hierarchy);
-  backend->set_operator({0.8, 400});
-  test::write(*backend, 0, x, p.deformation());
-  backend->rotate_cells(x);
-  solver.refresh();
-  test::write(*backend, 0, b, p.free_vector(0, 101));
-  backend->zero(0, x);
-  EXPECT_TRUE(solver.solve(b, x, tolerance).converged);
-  return p.read(*backend, 0, x);
+  const test::Solved solved = test::solve(p, *backend, setup, {0.8, 400}, tolerance);
+  EXPECT_TRUE(solved.stats.converged);
+  return solved.x;
 }
 
 TEST(InstructionSets, EachSolvesAsTheReference) {
