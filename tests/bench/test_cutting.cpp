@@ -281,9 +281,9 @@ std::string refusal(std::vector<const char*> arguments) {
 }
 
 TEST(CuttingOptions, NamesAndValuesAreChecked) {
-  EXPECT_EQ(refusal({"--scene", "bars"}), "no scene 'bars'; did you mean 'bar'?");
+  EXPECT_EQ(refusal({"--scene", "bars"}), "--scene: no scene 'bars'; did you mean 'bar'?");
   EXPECT_EQ(refusal({"--scene", "bar", "--method", "octre"}),
-            "no method 'octre'; did you mean 'octree'?");
+            "--method: no method 'octre'; did you mean 'octree'?");
   EXPECT_EQ(refusal({"--sceen", "bar"}), "no option '--sceen'; did you mean '--scene'?");
   EXPECT_EQ(refusal({"--scene", "bar", "--sizes", "4,x"}),
             "--sizes must be a number from 1 to 1024, not 'x'");
