@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/solve/definite.hpp"
 #include "core/solve/spectrum.hpp"
 #include "cpu/fast_state.hpp"
 
@@ -337,7 +338,7 @@ void FastBackend<S>::coarsen(int fine) {
   FastLevel<S>& to = levels_[fine + 1];
   const PatchedLevel& packed = to.patched;
   const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
-  to.matrices.allocate(packed, !coarsest, scale_.mass != 0);
+  to.matrices.allocate(packed, fine == 0 && !coarsest, scale_.mass != 0);
   const auto groups = static_cast<std::int32_t>(packed.groups());
   // General cells cost many times as much as others, and lie together.
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
@@ -456,18 +457,20 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
       out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
 }
 
-// What supports leave of a coarse matrix can be singular; rounding in single precision, and codes
-// on the levels between, make it indefinite by some 1e-6 of the diagonal. So there the share grows.
+// What supports leave of a coarse matrix can be singular, and rounding in single precision makes
+// some indefinite. There, cell matrices are made definite one by one; as that leaves directions
+// with hardly any stiffness, the share of the diagonal grows too.
 template <class S>
 void FastBackend<S>::factor_coarsest() {
-  constexpr double kGrowth = 100;
-  constexpr int kMost = kIsDouble ? 1 : 5;  // tries: up to a share of 1e-4
+  constexpr double kRounding = 1e-6, kGrowth = 100;
+  constexpr int kMost = kIsDouble ? 1 : 6;  // tries: up to a share of 1e-2
   const int last = static_cast<int>(levels_.size()) - 1;
   factored_ = false;
   double share = AssembledLevel::kShare;
   for (int tries = 1;; ++tries, share *= kGrowth) {
     coarsest_->assemble(hierarchy_->levels.back(), [&](std::int32_t cell, std::span<double> out) {
       read_cell_matrix(last, cell, out);
+      if (tries > 1) make_definite(out, kRounding);
     });
     if (last > 0) coarsest_->strengthen_diagonal(share);
     factored_ = coarsest_factor_.factor(*coarsest_);

@@ -154,9 +154,16 @@ class Patcher {
     }
     const bool held = out_.held[c] == kPartlyHeld;
     const bool masks = held && finer_->children.empty();  // children of level 0
-    if (masks || twice) return kGeneral;
+    if (masks || twice || is_loose(c)) return kGeneral;
     if (held) return passed ? kHeldPassed : kHeldMerged;
     return passed ? kPassed : kMerged;
+  }
+
+  // A cell of level 1 that is a whole piece. Its mass alone tells how it turns, and that drowns in
+  // the rounding of codes, which general cells do not have.
+  bool is_loose(std::int32_t c) const {
+    const bool has_links = !level_.link_begin.empty();  // else there are no loose cells
+    return has_links && finer_->children.empty() && level_.links_of(c).empty();
   }
 
   // --- which patches are made ------------------------------------------------------------------

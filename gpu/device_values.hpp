@@ -252,7 +252,7 @@ void DeviceBackend<Device, S>::read_cell_matrix(int level, std::int32_t cell,
 /// share of the diagonal that is added grows.
 template <class Device, class S>
 void DeviceBackend<Device, S>::factor_coarsest() {
-  constexpr double kGrowth = 100, kMost = kMixed ? 1e-6 : 0;
+  constexpr double kGrowth = 100, kMost = kMixed ? 1e-2 : 0;
   constexpr std::int32_t kMostUnknowns = 46340;  // entries are numbered by 31 bits
   expects(coarsest_.unknowns <= kMostUnknowns,
           text("the coarsest level has ", coarsest_.unknowns / 3,

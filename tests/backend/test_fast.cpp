@@ -301,6 +301,34 @@ TEST(MixedPrecision, SolvesWhereCodedMatricesWouldBeIndefinite) {
   EXPECT_LT(stats.cycles, 40);
 }
 
+// A single loose cell gives a large coarse cell entries over many orders of magnitude.
+TEST(MixedPrecision, SolvesBodiesWithLooseCellsInDynamics) {
+  constexpr double kTolerance = 1e-9;
+  constexpr OperatorScale kSlow{1, 3};
+  ProblemOptions options;
+  options.holds = test::Holds::one_side;
+  options.coarsest_vertices = 60;
+  options.materials = 1;
+  options.with_oracle = false;
+  const auto is_inside = [](const Vec3i& c) {
+    for (const Vec3i& loose : {Vec3i{40, 3, 5}, Vec3i{48, 8, 8}, Vec3i{63, 15, 15}, Vec3i{33, 0, 7}})
+      if (c == loose) return 1;
+    return c[0] < 30 ? 1 : 0;
+  };
+  const Problem p(LinkedOctree(test::make_voxels(test::lattice_of({64, 16, 16}), is_inside), 1),
+                  options);
+  ASSERT_GE(p.hierarchy.levels.size(), 5u);
+  const auto cycles = [&](const char* machine) {
+    const SolveStats stats =
+        test::solve(p, *test::make_backend(machine), {}, kSlow, kTolerance).stats;
+    EXPECT_TRUE(stats.converged) << machine;
+    EXPECT_LE(stats.residual, kTolerance) << machine;
+    return stats.cycles;
+  };
+  const int exact = cycles("fast");
+  EXPECT_LE(cycles("mixed"), exact + 2);
+}
+
 // A factor of slightly older rotations serves; one of another structure or operator does not.
 TEST(LinearSolver, KeepsTheFactorOfTheCoarsestLevelWhileItServes) {
   constexpr double kTolerance = 1e-9;
