@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <set>
@@ -11,6 +9,7 @@
 #include "bench/measure.hpp"
 #include "bench/options.hpp"
 #include "bench/plot.hpp"
+#include "bench/progress_line.hpp"
 #include "gpu/cuda_backend.hpp"
 
 namespace {
@@ -21,11 +20,6 @@ using namespace kerf::bench;
 /// The table on standard output; on a terminal, a line on standard error that says what runs.
 class Console {
  public:
-  Console() : terminal_(isatty(STDERR_FILENO) == 1) {}
-  ~Console() { clear(); }
-  Console(const Console&) = delete;
-  Console& operator=(const Console&) = delete;
-
   void head() {
     std::printf("%-16s %-19s %-10s %7s %-9s %10s %10s %11s %8s %7s %9s\n", "scene", "phase",
                 "backend", "threads", "precision", "ms_min", "ms_median", "ns_per_cell", "gb_per_s",
@@ -44,21 +38,12 @@ class Console {
     clear();
     std::fprintf(stderr, "kerf_bench: %s\n", line.c_str());
   }
-  void progress(const std::string& line) {
-    if (!terminal_) return;
-    constexpr int kWidth = 79;
-    std::fprintf(stderr, "\r%.*s\033[K", kWidth, line.c_str());
-    std::fflush(stderr);
-    shown_ = true;
-  }
+  void progress(const std::string& line) { progress_.show(line); }
 
  private:
-  void clear() {
-    if (shown_) std::fprintf(stderr, "\r\033[K");
-    shown_ = false;
-  }
+  void clear() { progress_.clear(); }
 
-  bool terminal_, shown_ = false;
+  ProgressLine progress_;
   std::set<std::string> notes_;
 };
 

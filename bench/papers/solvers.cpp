@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+//
+// Figure 12 of [DGW11]: error over time of four solvers, their own set-up included.
+#include "bench/papers/experiments.hpp"
+#include "core/base/error.hpp"
+
+namespace kerf::papers {
+namespace {
+
+constexpr const char* kName = "figure12";
+constexpr double kGoal = 1e-8;  // of the error
+// Its factor takes some 2 GB and half a minute there, and both grow faster than the body.
+constexpr std::size_t kMostForCholesky = 80000;
+
+struct Contestant {
+  const char* name;
+  SolverSetup solver;
+};
+
+std::vector<Contestant> contestants(const Problem& problem) {
+  std::vector<Contestant> out{{"CG-Jacobi", method_solver(SolverMethod::cg_jacobi)},
+                              {"multigrid", multigrid_solver()},
+                              {"CG-multigrid", default_solver()}};
+  if (problem.vertices() <= kMostForCholesky)
+    out.push_back({"Cholesky", method_solver(SolverMethod::cholesky)});
+  return out;
+}
+
+void run_panel(Context& context, const SimulationSetup& setup, const std::string& panel,
+               double density) {
+  context.doing(text(kName, ": ", panel));
+  const Problem problem(setup);
+  Machine machine(problem, fast_backend(context.threads), density);
+  machine.find_solution();
+  context.results.add(
+      {kName, panel, "", "cells", "1", kNone, static_cast<double>(problem.cells())});
+  for (const Contestant& one : contestants(problem)) {
+    context.doing(text(kName, ": ", panel, ", ", one.name));
+    const Course course = machine.run(one.solver, {0, context.give_up, kGoal});
+    const auto add = [&](const char* quantity, const char* unit, double value) {
+      context.results.add({kName, panel, one.name, quantity, unit, kNone, value});
+    };
+    add("structural set-up", "s", course.structure);
+    add("other set-up", "s", course.values);
+    add("to an error of 0.1", "s", course.seconds_to(0.1));
+    add("to an error of 0.01", "s", course.seconds_to(0.01));
+    add("to an error of 1e-6", "s", course.seconds_to(1e-6));
+    for (const Sample& s : course.samples)
+      context.results.points.push_back(
+          {kName, panel, one.name, s.seconds, s.error, s.cycle == 0 && course.structure > 0});
+  }
+}
+
+}  // namespace
+
+// The bodies of the paper, and both at a size at which Cholesky fits.
+void run_figure12(Context& context) {
+  for (const char* name : {"Cube", "Armadillo"})
+    for (const int halvings : {0, name == std::string("Cube") ? 1 : 2})
+      for (const double density : {1.0, 0.0}) {
+        if (context.size == bench::Size::small && halvings > 0) continue;  // they are small anyway
+        BodyInfo info = body(name);
+        info.resolution >>= halvings;
+        info.refinement -= halvings;
+        std::optional<SimulationSetup> setup = setup_of(context, info, Grid::adaptive);
+        if (!setup) continue;
+        setup->time.mode = density == 0 ? TimeMode::statics : TimeMode::dynamic;
+        const char* sizes[] = {"", " at half size", " at a quarter size"};
+        run_panel(context, *setup,
+                  text(name, sizes[halvings], density == 0 ? " without mass" : " of medium mass"),
+                  density);
+      }
+}
+
+}  // namespace kerf::papers
