@@ -92,6 +92,8 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
     level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
                          kTileScalars * level.patched.tiles());
   }
+  folds_ = SlotTable<S>(hierarchy.lumped_mass ? kernels::MassModel::lumped
+                                              : kernels::MassModel::consistent);
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
   load_coarsest();
@@ -407,9 +409,9 @@ void FastBackend<S>::prepare(int level) {
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
       if (level == 0)
-        add_finest_diagonals(packed, values_of<S>(), scale_, group, to);
+        add_finest_diagonals(packed, values_of<S>(), scale_, folds_, group, to);
       else
-        add_stored_diagonals(packed, l.matrices, group, to);
+        add_stored_diagonals(packed, l.matrices, folds_, group, to);
     }
     invert_own(l, patch, to);
     for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {

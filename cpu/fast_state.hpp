@@ -15,6 +15,7 @@
 #include "core/backend.hpp"
 #include "core/base/error.hpp"
 #include "core/solve/sparse_cholesky.hpp"
+#include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/patch_sweep.hpp"
@@ -258,6 +259,7 @@ class FastBackend final : public Backend {
   OperatorScale scale_;
   FinestValues<double> exact_;  // of level 0
   FinestValues<S> single_;      // the same, rounded; empty if S is double
+  SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
   std::vector<double> partial_;  // sums of shared vertices, by copy; of the scalars of the sweep
