@@ -221,17 +221,16 @@ void FastBackend<S>::write_rotations(std::span<const double> in) {
 
 template <class S>
 template <class T>
-void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
-                                 int out) {
+void FastBackend<S>::apply_typed(int level, int in, int out) {
   FastLevel<S>& l = levels_[level];
   const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
   sweep<T>(
       level, kNothingBefore, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
+      [&](std::size_t group, const T* x, T* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
-        store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
+        store_tile(to, tile, first, masked(sum, l.fixed(tile, first)));
         return Sums{};
       });
 }
@@ -242,35 +241,40 @@ void FastBackend<S>::apply(int level, int in, int out) {
   settle();
   changed(level, out);
   if (is_exact(level, in))
-    apply_typed<double>(level, scale_, true, in, out);
+    apply_typed<double>(level, in, out);
   else
-    apply_typed<S>(level, scale_, true, in, out);
+    apply_typed<S>(level, in, out);
 }
 
 template <class S>
-void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
+template <class Cells>
+void FastBackend<S>::sum_forces(int in, int out, const Cells& cells) {
   expects_exact(in, out);
   settle();
-  apply_typed<double>(0, scale, false, in, out);
-}
-
-template <class S>
-void FastBackend<S>::elastic_force(int displacement, int out) {
-  expects_exact(displacement, out);
-  settle();
   FastLevel<S>& l = levels_[0];
-  const double* u = l.vectors[displacement].exact.data();
+  const double* u = l.vectors[in].exact.data();
   double* to = l.vectors[out].exact.data();
   sweep<double>(
       0, kNothingBefore, kNothingBefore,
-      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const double* x, double* y) {
-        elastic_forces(l.patched, exact_, group, x, y);
-      },
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u, cells,
       [&](std::size_t tile, int first, const Vec3<Pack<double>>& sum, const auto&) {
         store_tile(to, tile, first, sum);
         return Sums{};
       });
+}
+
+template <class S>
+void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
+  sum_forces(in, out, [&](std::size_t group, const double* x, double* y) {
+    finest_products(levels_[0].patched, exact_, scale, group, x, y);
+  });
+}
+
+template <class S>
+void FastBackend<S>::elastic_force(int displacement, int out) {
+  sum_forces(displacement, out, [&](std::size_t group, const double* x, double* y) {
+    elastic_forces(levels_[0].patched, exact_, group, x, y);
+  });
 }
 
 // The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
@@ -346,7 +350,7 @@ void FastBackend<S>::coarsen(int fine) {
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     const std::uint16_t kind = packed.kind[group];
-    if (kind == kNoCells) continue;
+    if (kind == kNoCells || kind == kIdle) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
@@ -408,6 +412,7 @@ void FastBackend<S>::prepare(int level) {
     const BlockPoints<S> to{blocks, blocks + scalars};
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
+      if (packed.idle(group)) continue;
       if (level == 0)
         add_finest_diagonals(packed, values_of<S>(), scale_, folds_, group, to);
       else

@@ -227,10 +227,11 @@ class FastBackend final : public Backend {
   Sums sweep(int level, const Before& before, const Start& start, const Own& own, const T* u,
              const Cells& cells, const Finish& finish);
   template <class T>
-  void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
-                    T* y) const;
+  void add_products(int level, std::size_t group, const T* x, T* y) const;
   template <class T>
-  void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
+  void apply_typed(int level, int in, int out);
+  template <class Cells>
+  void sum_forces(int in, int out, const Cells& cells);
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
   void add_general_children(const FastLevel<S>& from, bool finest,
@@ -331,13 +332,14 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
   return sum;
 }
 
+/// Held components are not exact: what wholly held cells add to theirs is left out.
 template <class S>
 template <class T>
-void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::size_t group,
-                                  const T* x, T* y) const {
+void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y) const {
   const FastLevel<S>& l = levels_[level];
+  if (l.patched.idle(group)) return;
   if (level == 0) {
-    finest_products(l.patched, values_of<T>(), scale, group, x, y);
+    finest_products(l.patched, values_of<T>(), scale_, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
     stored_products(l.patched, l.matrices, group, x, y);
   }

@@ -70,10 +70,12 @@ class StoredMatrices {
       const bool held = level.kind[g] >= kHeldMerged;
       const bool is_coded = coded && std::is_same_v<S, float> && !held;
       const bool full = with_mass || held;
-      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0)));
+      const bool none = level.kind[g] == kNoCells || level.kind[g] == kIdle;
+      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0) |
+                                                  (none ? kNone : 0)));
       std::size_t& size = is_coded ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
-      if (level.kind[g] != kNoCells) size += full ? kernels::kEntries : kernels::kModeEntries;
+      if (!none) size += full ? kernels::kEntries : kernels::kModeEntries;
     }
     plain_.resize(kGroup * plain);
     codes_.resize(kGroup * codes);
@@ -115,14 +117,14 @@ class StoredMatrices {
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero in rows of translations that are
-  /// not stored.
+  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     for (P& entry : out) entry = P{};
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const auto lane = static_cast<std::size_t>(lanes[k]);
       const std::size_t group = lane / kGroup;
+      if ((traits_[group] & kNone) != 0) continue;
       const int count = with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
       const std::size_t at = kGroup * std::size_t{begin_[group]} + lane % kGroup;
       if (is_coded(group)) {
@@ -138,7 +140,7 @@ class StoredMatrices {
   }
 
  private:
-  static constexpr std::uint8_t kFull = 1, kCoded = 2;
+  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4;
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
 
   void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
