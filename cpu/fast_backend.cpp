@@ -15,9 +15,7 @@ namespace kerf::cpu {
 
 template <class S>
 FastBackend<S>::FastBackend(int threads, bool updates)
-    : threads_(threads > 0 ? threads : omp_get_max_threads()),
-      updates_(updates),
-      coarsest_factor_(CholeskyEngine::simplicial) {
+    : threads_(threads > 0 ? threads : omp_get_max_threads()), updates_(updates) {
   constexpr int kMaxThreads = 1024;
   expects(threads >= 0 && threads <= kMaxThreads,
           text("solver.threads must lie in 0 .. ", kMaxThreads, "; 0 takes all cores"));
@@ -32,7 +30,7 @@ std::size_t FastBackend<S>::bytes() const {
     sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
            level.vectors.bytes();
   }
-  if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.factor_entries() * 12;
+  if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.bytes();
   return sum;
 }
 
@@ -73,7 +71,7 @@ double FastBackend<S>::bytes_per_cell() const noexcept {
 template <class S>
 void FastBackend<S>::load_coarsest() {
   coarsest_ = std::make_unique<AssembledLevel>(hierarchy_->levels.back());
-  coarsest_factor_.analyse(*coarsest_);
+  coarsest_factor_.analyse(hierarchy_->levels.back(), *coarsest_);
   factored_ = false;
 }
 
@@ -435,32 +433,61 @@ void FastBackend<S>::prepare(int level) {
 }
 
 template <class S>
-void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
-  const FastLevel<S>& l = levels_[level];
+void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
+                                   Pack<double> (&full)[24][24]) const {
   using P = Pack<double>;
-  std::int32_t cells[P::kLanes];
-  std::fill(std::begin(cells), std::end(cells), -1);
-  cells[0] = cell;
-  P full[24][24] = {};
+  const PatchedLevel& packed = levels_[level].patched;
+  bool any_folded = false;
   if (level == 0) {
-    const FinestLanes<double> lanes(l.patched, exact_, scale_, cells);
-    corner_matrices(l.patched, exact_, lanes, full);
-    if (lanes.any_folded) fold_matrices<P>(l.patched, cells, full);
-    if (lanes.any_held) mask_matrices(l.patched, lanes, full);
-  } else {
-    std::int32_t lanes[Pack<S>::kLanes];
-    std::fill(std::begin(lanes), std::end(lanes), -1);
-    lanes[0] = l.patched.lane[cell];
-    Pack<S> entries[kEntries];
-    P exact[kEntries];
-    l.matrices.gather(lanes, entries);
-    for (int e = 0; e < kEntries; ++e) exact[e] = P(static_cast<double>(entries[e][0]));
-    full_from_modes(exact, full);
-    if (kernels::has_hanging(l.patched.level->fold[cell])) fold_matrices<P>(l.patched, cells, full);
+    const FinestLanes<double> lanes(packed, exact_, scale_, cells);
+    corner_matrices(packed, exact_, lanes, full);
+    if (lanes.any_folded) fold_matrices<P>(packed, cells, full);
+    if (lanes.any_held) mask_matrices(packed, lanes, full);
+    return;
   }
+  std::int32_t lanes[Pack<S>::kLanes];
+  std::fill(std::begin(lanes), std::end(lanes), -1);
+  for (int k = 0; k < P::kLanes; ++k) {
+    if (cells[k] < 0) continue;
+    lanes[k] = packed.lane[cells[k]];
+    any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
+  }
+  Pack<S> entries[kEntries];
+  P exact[kEntries];
+  levels_[level].matrices.gather(lanes, entries);
+  for (int e = 0; e < kEntries; ++e)
+    for (int k = 0; k < P::kLanes; ++k) exact[e].set(k, static_cast<double>(entries[e][k]));
+  full_from_modes(exact, full);
+  if (any_folded) fold_matrices<P>(packed, cells, full);
+}
+
+void read_lane(const Pack<double> (&full)[24][24], int lane, std::span<double> out) {
   for (int i = 0; i < 24; ++i)
     for (int j = 0; j <= i; ++j)
-      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
+      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][lane];
+}
+
+template <class S>
+void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
+  Pack<double> full[24][24];
+  read_matrices(level, {cell, -1, -1, -1}, full);
+  read_lane(full, 0, out);
+}
+
+/// The matrices of the coarsest level, several cells at a time.
+template <class S>
+void FastBackend<S>::assemble_coarsest() {
+  constexpr int kLanes = Pack<double>::kLanes;
+  const Level& level = hierarchy_->levels.back();
+  Pack<double> full[24][24];
+  coarsest_->assemble(level, [&](std::int32_t cell, std::span<double> out) {
+    if (cell % kLanes == 0) {
+      std::int32_t cells[kLanes];
+      for (int k = 0; k < kLanes; ++k) cells[k] = cell + k < level.cells() ? cell + k : -1;
+      read_matrices(static_cast<int>(levels_.size()) - 1, cells, full);
+    }
+    read_lane(full, cell % kLanes, out);
+  });
 }
 
 // What supports leave of a coarse matrix can be singular; rounding in single precision, and codes
@@ -473,11 +500,9 @@ void FastBackend<S>::factor_coarsest() {
   factored_ = false;
   double share = AssembledLevel::kShare;
   for (int tries = 1;; ++tries, share *= kGrowth) {
-    coarsest_->assemble(hierarchy_->levels.back(), [&](std::int32_t cell, std::span<double> out) {
-      read_cell_matrix(last, cell, out);
-    });
+    assemble_coarsest();
     if (last > 0) coarsest_->strengthen_diagonal(share);
-    factored_ = coarsest_factor_.factor(*coarsest_);
+    factored_ = coarsest_factor_.factor(*coarsest_, threads_);
     if (factored_) return;
     expects(last > 0 && tries < kMost,
             "the system matrix is not positive definite: in static mode some part of the body can "

@@ -233,11 +233,11 @@ void FastBackend<S>::solve_coarsest() {
   settle();
   FastLevel<S>& l = levels_.back();
   l.solution_is_zero = false;
-  const std::size_t size = 3 * l.patched.packed.size();
-  std::vector<double> right(size), solution(size);
-  read(static_cast<int>(levels_.size()) - 1, kRight, right);
-  coarsest_factor_.solve(right, solution);
-  write(static_cast<int>(levels_.size()) - 1, kSolution, solution);
+  const int last = static_cast<int>(levels_.size()) - 1;
+  std::vector<double> x(3 * l.patched.packed.size());
+  read(last, kRight, x);
+  coarsest_factor_.solve(x);
+  write(last, kSolution, x);
 }
 
 template <class S>

@@ -14,9 +14,9 @@
 
 #include "core/backend.hpp"
 #include "core/base/error.hpp"
-#include "core/solve/sparse_cholesky.hpp"
 #include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
+#include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/transfer_points.hpp"
@@ -234,6 +234,9 @@ class FastBackend final : public Backend {
   void sum_forces(int in, int out, const Cells& cells);
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
+  void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
+                     Pack<double> (&full)[24][24]) const;
+  void assemble_coarsest();
   void add_general_children(const FastLevel<S>& from, bool finest,
                             const std::int32_t (&child)[Pack<S>::kLanes],
                             Pack<S> (&sum)[kEntries]) const;
@@ -268,7 +271,7 @@ class FastBackend final : public Backend {
   std::vector<Vec3d> faces_;     // of the surface: area normals
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
-  SparseCholesky coarsest_factor_;
+  FrontFactor<S> coarsest_factor_;
   bool factored_ = false;
 };
 
