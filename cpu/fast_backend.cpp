@@ -16,9 +16,7 @@ namespace kerf::cpu {
 
 template <class S>
 FastBackend<S>::FastBackend(int threads, bool updates)
-    : threads_(threads > 0 ? threads : omp_get_max_threads()),
-      updates_(updates),
-      coarsest_factor_(CholeskyEngine::simplicial) {
+    : threads_(threads > 0 ? threads : omp_get_max_threads()), updates_(updates) {
   constexpr int kMaxThreads = 1024;
   expects(threads >= 0 && threads <= kMaxThreads,
           text("solver.threads must lie in 0 .. ", kMaxThreads, "; 0 takes all cores"));
@@ -33,7 +31,7 @@ std::size_t FastBackend<S>::bytes() const {
     sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
            level.vectors.bytes();
   }
-  if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.factor_entries() * 12;
+  if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.bytes();
   return sum;
 }
 
@@ -74,7 +72,7 @@ double FastBackend<S>::bytes_per_cell() const noexcept {
 template <class S>
 void FastBackend<S>::load_coarsest() {
   coarsest_ = std::make_unique<AssembledLevel>(hierarchy_->levels.back());
-  coarsest_factor_.analyse(*coarsest_);
+  coarsest_factor_.analyse(hierarchy_->levels.back(), *coarsest_);
   factored_ = false;
 }
 
@@ -93,6 +91,8 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
     level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
                          kTileScalars * level.patched.tiles());
   }
+  folds_ = SlotTable<S>(hierarchy.lumped_mass ? kernels::MassModel::lumped
+                                              : kernels::MassModel::consistent);
   start_values(hierarchy, levels_[0].patched, exact_);
   if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
   load_coarsest();
@@ -220,17 +220,16 @@ void FastBackend<S>::write_rotations(std::span<const double> in) {
 
 template <class S>
 template <class T>
-void FastBackend<S>::apply_typed(int level, const OperatorScale& scale, bool masks, int in,
-                                 int out) {
+void FastBackend<S>::apply_typed(int level, int in, int out) {
   FastLevel<S>& l = levels_[level];
   const T* u = l.vectors[in].template in<T>().data();
   T* to = l.vectors[out].template in<T>().data();
   sweep<T>(
       level, kNothingBefore, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const T* x, T* y) { add_products(level, scale, group, x, y); },
+      [&](std::size_t group, const T* x, T* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<T>>& sum, const auto&) {
-        store_tile(to, tile, first, masks ? masked(sum, l.fixed(tile, first)) : sum);
+        store_tile(to, tile, first, masked(sum, l.fixed(tile, first)));
         return Sums{};
       });
 }
@@ -241,35 +240,40 @@ void FastBackend<S>::apply(int level, int in, int out) {
   settle();
   changed(level, out);
   if (is_exact(level, in))
-    apply_typed<double>(level, scale_, true, in, out);
+    apply_typed<double>(level, in, out);
   else
-    apply_typed<S>(level, scale_, true, in, out);
+    apply_typed<S>(level, in, out);
 }
 
 template <class S>
-void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
+template <class Cells>
+void FastBackend<S>::sum_forces(int in, int out, const Cells& cells) {
   expects_exact(in, out);
   settle();
-  apply_typed<double>(0, scale, false, in, out);
-}
-
-template <class S>
-void FastBackend<S>::elastic_force(int displacement, int out) {
-  expects_exact(displacement, out);
-  settle();
   FastLevel<S>& l = levels_[0];
-  const double* u = l.vectors[displacement].exact.data();
+  const double* u = l.vectors[in].exact.data();
   double* to = l.vectors[out].exact.data();
   sweep<double>(
       0, kNothingBefore, kNothingBefore,
-      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const double* x, double* y) {
-        elastic_forces(l.patched, exact_, group, x, y);
-      },
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u, cells,
       [&](std::size_t tile, int first, const Vec3<Pack<double>>& sum, const auto&) {
         store_tile(to, tile, first, sum);
         return Sums{};
       });
+}
+
+template <class S>
+void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
+  sum_forces(in, out, [&](std::size_t group, const double* x, double* y) {
+    finest_products(levels_[0].patched, exact_, scale, group, x, y);
+  });
+}
+
+template <class S>
+void FastBackend<S>::elastic_force(int displacement, int out) {
+  sum_forces(displacement, out, [&](std::size_t group, const double* x, double* y) {
+    elastic_forces(levels_[0].patched, exact_, group, x, y);
+  });
 }
 
 // The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
@@ -345,7 +349,7 @@ void FastBackend<S>::coarsen(int fine) {
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     const std::uint16_t kind = packed.kind[group];
-    if (kind == kNoCells) continue;
+    if (kind == kNoCells || kind == kIdle) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
@@ -407,10 +411,11 @@ void FastBackend<S>::prepare(int level) {
     const BlockPoints<S> to{blocks, blocks + scalars};
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
+      if (packed.idle(group)) continue;
       if (level == 0)
-        add_finest_diagonals(packed, values_of<S>(), scale_, group, to);
+        add_finest_diagonals(packed, values_of<S>(), scale_, folds_, group, to);
       else
-        add_stored_diagonals(packed, l.matrices, group, to);
+        add_stored_diagonals(packed, l.matrices, folds_, group, to);
     }
     invert_own(l, patch, to);
     for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
@@ -429,32 +434,63 @@ void FastBackend<S>::prepare(int level) {
 }
 
 template <class S>
-void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
-  const FastLevel<S>& l = levels_[level];
+void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
+                                   Pack<double> (&full)[24][24]) const {
   using P = Pack<double>;
-  std::int32_t cells[P::kLanes];
-  std::fill(std::begin(cells), std::end(cells), -1);
-  cells[0] = cell;
-  P full[24][24] = {};
+  const PatchedLevel& packed = levels_[level].patched;
+  bool any_folded = false;
   if (level == 0) {
-    const FinestLanes<double> lanes(l.patched, exact_, scale_, cells);
-    corner_matrices(l.patched, exact_, lanes, full);
-    if (lanes.any_folded) fold_matrices<P>(l.patched, cells, full);
-    if (lanes.any_held) mask_matrices(l.patched, lanes, full);
-  } else {
-    std::int32_t lanes[Pack<S>::kLanes];
-    std::fill(std::begin(lanes), std::end(lanes), -1);
-    lanes[0] = l.patched.lane[cell];
-    Pack<S> entries[kEntries];
-    P exact[kEntries];
-    l.matrices.gather(lanes, entries);
-    for (int e = 0; e < kEntries; ++e) exact[e] = P(static_cast<double>(entries[e][0]));
-    full_from_modes(exact, full);
-    if (kernels::has_hanging(l.patched.level->fold[cell])) fold_matrices<P>(l.patched, cells, full);
+    const FinestLanes<double> lanes(packed, exact_, scale_, cells);
+    corner_matrices(packed, exact_, lanes, full);
+    if (lanes.any_folded) fold_matrices<P>(packed, cells, full);
+    if (lanes.any_held) mask_matrices(packed, lanes, full);
+    return;
   }
+  std::int32_t lanes[Pack<S>::kLanes];
+  std::fill(std::begin(lanes), std::end(lanes), -1);
+  for (int k = 0; k < P::kLanes; ++k) {
+    if (cells[k] < 0) continue;
+    lanes[k] = packed.lane[cells[k]];
+    any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
+  }
+  Pack<S> entries[kEntries];
+  P exact[kEntries];
+  levels_[level].matrices.gather(lanes, entries);
+  for (int e = 0; e < kEntries; ++e)
+    for (int k = 0; k < P::kLanes; ++k) exact[e].set(k, static_cast<double>(entries[e][k]));
+  full_from_modes(exact, full);
+  if (any_folded) fold_matrices<P>(packed, cells, full);
+}
+
+void read_lane(const Pack<double> (&full)[24][24], int lane, std::span<double> out) {
   for (int i = 0; i < 24; ++i)
     for (int j = 0; j <= i; ++j)
-      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][0];
+      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][lane];
+}
+
+template <class S>
+void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
+  Pack<double> full[24][24];
+  read_matrices(level, {cell, -1, -1, -1}, full);
+  read_lane(full, 0, out);
+}
+
+/// The matrices of the coarsest level, several cells at a time.
+template <class S>
+void FastBackend<S>::assemble_coarsest(bool definite) {
+  constexpr double kRounding = 1e-6;
+  constexpr int kLanes = Pack<double>::kLanes;
+  const Level& level = hierarchy_->levels.back();
+  Pack<double> full[24][24];
+  coarsest_->assemble(level, [&](std::int32_t cell, std::span<double> out) {
+    if (cell % kLanes == 0) {
+      std::int32_t cells[kLanes];
+      for (int k = 0; k < kLanes; ++k) cells[k] = cell + k < level.cells() ? cell + k : -1;
+      read_matrices(static_cast<int>(levels_.size()) - 1, cells, full);
+    }
+    read_lane(full, cell % kLanes, out);
+    if (definite) make_definite(out, kRounding);
+  });
 }
 
 // What supports leave of a coarse matrix can be singular, and rounding in single precision makes
@@ -462,18 +498,15 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
 // with hardly any stiffness, the share of the diagonal grows too.
 template <class S>
 void FastBackend<S>::factor_coarsest() {
-  constexpr double kRounding = 1e-6, kGrowth = 100;
+  constexpr double kGrowth = 100;
   constexpr int kMost = kIsDouble ? 1 : 6;  // tries: up to a share of 1e-2
   const int last = static_cast<int>(levels_.size()) - 1;
   factored_ = false;
   double share = AssembledLevel::kShare;
   for (int tries = 1;; ++tries, share *= kGrowth) {
-    coarsest_->assemble(hierarchy_->levels.back(), [&](std::int32_t cell, std::span<double> out) {
-      read_cell_matrix(last, cell, out);
-      if (tries > 1) make_definite(out, kRounding);
-    });
+    assemble_coarsest(tries > 1);
     if (last > 0) coarsest_->strengthen_diagonal(share);
-    factored_ = coarsest_factor_.factor(*coarsest_);
+    factored_ = coarsest_factor_.factor(*coarsest_, threads_);
     if (factored_) return;
     expects(last > 0 && tries < kMost,
             "the system matrix is not positive definite: in static mode some part of the body can "

@@ -25,7 +25,7 @@ double FastBackend<S>::residual(int level) {
   const Sums sums = sweep<S>(
       level, kNothingBefore, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
-      [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
+      [&](std::size_t group, const S* x, S* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
         const auto at = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
         store_tile(r, tile, first, at);
@@ -79,7 +79,7 @@ void FastBackend<S>::chebyshev_step(int level, const Value& value, S keep, S tak
         for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
       },
       start, value, u,
-      [&](std::size_t group, const S* x, S* y) { add_products(level, scale_, group, x, y); },
+      [&](std::size_t group, const S* x, S* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const V& sum, const auto& before) {
         const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
         const V at = before();
@@ -233,11 +233,11 @@ void FastBackend<S>::solve_coarsest() {
   settle();
   FastLevel<S>& l = levels_.back();
   l.solution_is_zero = false;
-  const std::size_t size = 3 * l.patched.packed.size();
-  std::vector<double> right(size), solution(size);
-  read(static_cast<int>(levels_.size()) - 1, kRight, right);
-  coarsest_factor_.solve(right, solution);
-  write(static_cast<int>(levels_.size()) - 1, kSolution, solution);
+  const int last = static_cast<int>(levels_.size()) - 1;
+  std::vector<double> x(3 * l.patched.packed.size());
+  read(last, kRight, x);
+  coarsest_factor_.solve(x);
+  write(last, kSolution, x);
 }
 
 template <class S>
@@ -359,9 +359,7 @@ std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int 
     sums = sweep<double>(
         0, [&](std::size_t tile) { for_packs<double>([&](int first) { advance(tile, first); }); },
         kNothingBefore, advance, to,
-        [&](std::size_t group, const double* x, double* y) {
-          add_products(0, scale_, group, x, y);
-        },
+        [&](std::size_t group, const double* x, double* y) { add_products(0, group, x, y); },
         [&](std::size_t tile, int first, const V& sum, const auto& value) {
           const V at = value(), out = masked(sum, l.fixed(tile, first));
           store_tile(product, tile, first, out);

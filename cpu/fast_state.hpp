@@ -14,8 +14,9 @@
 
 #include "core/backend.hpp"
 #include "core/base/error.hpp"
-#include "core/solve/sparse_cholesky.hpp"
+#include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
+#include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/transfer_points.hpp"
@@ -226,12 +227,16 @@ class FastBackend final : public Backend {
   Sums sweep(int level, const Before& before, const Start& start, const Own& own, const T* u,
              const Cells& cells, const Finish& finish);
   template <class T>
-  void add_products(int level, const OperatorScale& scale, std::size_t group, const T* x,
-                    T* y) const;
+  void add_products(int level, std::size_t group, const T* x, T* y) const;
   template <class T>
-  void apply_typed(int level, const OperatorScale& scale, bool masks, int in, int out);
+  void apply_typed(int level, int in, int out);
+  template <class Cells>
+  void sum_forces(int in, int out, const Cells& cells);
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
+  void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
+                     Pack<double> (&full)[24][24]) const;
+  void assemble_coarsest(bool definite);
   void add_general_children(const FastLevel<S>& from, bool finest,
                             const std::int32_t (&child)[Pack<S>::kLanes],
                             Pack<S> (&sum)[kEntries]) const;
@@ -258,6 +263,7 @@ class FastBackend final : public Backend {
   OperatorScale scale_;
   FinestValues<double> exact_;  // of level 0
   FinestValues<S> single_;      // the same, rounded; empty if S is double
+  SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
   std::vector<double> partial_;  // sums of shared vertices, by copy; of the scalars of the sweep
@@ -265,7 +271,7 @@ class FastBackend final : public Backend {
   std::vector<Vec3d> faces_;     // of the surface: area normals
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
-  SparseCholesky coarsest_factor_;
+  FrontFactor<S> coarsest_factor_;
   bool factored_ = false;
 };
 
@@ -329,13 +335,14 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
   return sum;
 }
 
+/// Held components are not exact: what wholly held cells add to theirs is left out.
 template <class S>
 template <class T>
-void FastBackend<S>::add_products(int level, const OperatorScale& scale, std::size_t group,
-                                  const T* x, T* y) const {
+void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y) const {
   const FastLevel<S>& l = levels_[level];
+  if (l.patched.idle(group)) return;
   if (level == 0) {
-    finest_products(l.patched, values_of<T>(), scale, group, x, y);
+    finest_products(l.patched, values_of<T>(), scale_, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
     stored_products(l.patched, l.matrices, group, x, y);
   }

@@ -132,7 +132,7 @@ class Patcher {
   std::uint16_t finest_kind(std::int32_t c) {
     const CellValues& v = hierarchy_.values[c];
     const CellKind kind{v.stiffness, v.mass, hierarchy_.spacing * (1 << level_.size_log2[c]),
-                        v.material};
+                        v.material, out_.held[c] == kWhollyHeld};
     std::vector<CellKind>& kinds = out_.kinds;
     if (last_kind_ >= kinds.size() || !(kinds[last_kind_] == kind))
       last_kind_ =
@@ -143,6 +143,7 @@ class Patcher {
   }
 
   std::uint16_t stored_kind(std::int32_t c) const {
+    if (out_.held[c] == kWhollyHeld) return kIdle;
     const auto children = level_.children_of(c);
     const bool passed = finer_->level->place[children[0]] == Level::kPassed;
     unsigned octants = 0;  // without duplication two children can have one

@@ -36,6 +36,7 @@ inline constexpr std::size_t kTileScalars = 3 * kGroup;
 enum StoredKind : std::uint16_t {
   kMerged,  ///< from children without held components, one an octant
   kPassed,  ///< from one cell of the same place and size, without held components
+  kIdle,    ///< wholly held: its matrix is zero, and not stored
   // Where some cell of level 0 below is partly held:
   kHeldMerged,       ///< from children above level 0, one an octant
   kHeldPassed,       ///< from one cell above level 0
@@ -44,7 +45,7 @@ enum StoredKind : std::uint16_t {
 };
 
 /// Whether components of the vertices of a cell are held. A wholly held cell takes no part in any
-/// product, so its matrix is zero to the levels above.
+/// product of the operator, so its matrix is zero to the levels above. Forces ask it too.
 enum HeldCell : std::uint8_t { kFree, kPartlyHeld, kWhollyHeld };
 
 /// How the points of a group lie.
@@ -68,6 +69,7 @@ struct Range {
 struct CellKind {
   double stiffness = 0, mass = 0, side = 0;  // E side, density side^3, m
   std::uint8_t material = 0;
+  bool idle = false;  // wholly held
 
   friend bool operator==(const CellKind&, const CellKind&) = default;
 };
@@ -152,6 +154,10 @@ struct PatchedLevel {
   static bool is_shared(std::int32_t home) { return home < kNowhere; }
 
   bool folded(std::size_t group) const { return slots_at[group] >= 0; }
+  /// Whether the cells of a group are wholly held.
+  bool idle(std::size_t group) const {
+    return kinds.empty() ? kind[group] == kIdle : kinds[kind[group]].idle;
+  }
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
   std::size_t tiles() const { return vertex.size() / kGroup; }

@@ -47,6 +47,42 @@ inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
 #endif
 }
 
+/// One entry of eight cells.
+struct alignas(16) CodeLanes {
+  std::int16_t at[8];
+};
+
+/// Brings some lanes of eight codes to lanes of others.
+class LanePicker {
+ public:
+  void pick(int to, int from) {
+    bytes_[2 * to] = static_cast<std::uint8_t>(2 * from);
+    bytes_[2 * to + 1] = static_cast<std::uint8_t>(2 * from + 1);
+  }
+  /// Where it picks none, zero if this is the first, else what was there.
+  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
+#if defined(__AVX2__) && defined(__FMA__)
+    auto* out = reinterpret_cast<__m128i*>(to.at);
+    const __m128i order = _mm_load_si128(reinterpret_cast<const __m128i*>(bytes_));
+    const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
+    const __m128i picked = _mm_shuffle_epi8(codes, order);
+    _mm_store_si128(out, first ? picked : _mm_or_si128(picked, _mm_load_si128(out)));
+#else
+    for (int k = 0; k < 8; ++k) {
+      if (bytes_[2 * k] != kZero)
+        to.at[k] = from[bytes_[2 * k] / 2];
+      else if (first)
+        to.at[k] = 0;
+    }
+#endif
+  }
+
+ private:
+  static constexpr std::uint8_t kZero = 0x80;
+  alignas(16) std::uint8_t bytes_[16] = {kZero, kZero, kZero, kZero, kZero, kZero, kZero, kZero,
+                                         kZero, kZero, kZero, kZero, kZero, kZero, kZero, kZero};
+};
+
 template <class S>
 struct PlainEntries {
   const S* from;
@@ -71,10 +107,12 @@ class StoredMatrices {
       const bool held = level.kind[g] >= kHeldMerged;
       const bool is_coded = coded && std::is_same_v<S, float> && !held;
       const bool full = with_mass || held;
-      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0)));
+      const bool none = level.kind[g] == kNoCells || level.kind[g] == kIdle;
+      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0) |
+                                                  (none ? kNone : 0)));
       std::size_t& size = is_coded ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
-      if (level.kind[g] != kNoCells) size += full ? kernels::kEntries : kernels::kModeEntries;
+      if (!none) size += full ? kernels::kEntries : kernels::kModeEntries;
     }
     plain_.resize(kGroup * plain);
     codes_.resize(kGroup * codes);
@@ -90,7 +128,7 @@ class StoredMatrices {
 
   /// Of the lanes from `first` on.
   void store(std::size_t group, int first, const P (&entries)[kernels::kEntries]) {
-    const int count = with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
+    const int count = entries_of(group);
     if (!is_coded(group)) {
       S* to = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
       for (int e = 0; e < count; ++e) store_pack(to + kGroup * e, entries[e]);
@@ -116,31 +154,57 @@ class StoredMatrices {
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero in rows of translations that are
-  /// not stored.
+  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
-    for (P& entry : out) entry = P{};
+    int count = 0;
+    if constexpr (std::is_same_v<S, float>) count = gather_codes(lanes, out);
+    std::fill(out + count, out + kernels::kEntries, P{});
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const auto lane = static_cast<std::size_t>(lanes[k]);
       const std::size_t group = lane / kGroup;
-      const int count = with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
-      const std::size_t at = kGroup * std::size_t{begin_[group]} + lane % kGroup;
-      if (is_coded(group)) {
-        const S unit = unit_[lane];
-        const std::int16_t* from = codes_.data() + at;
-        for (int e = 0; e < count; ++e)
-          out[e].set(k, unit * static_cast<S>(from[kGroup * static_cast<std::size_t>(e)]));
-      } else {
-        const S* from = plain_.data() + at;
-        for (int e = 0; e < count; ++e) out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
-      }
+      if ((traits_[group] & (kNone | kCoded)) != 0) continue;
+      const S* from = plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup;
+      for (int e = 0; e < entries_of(group); ++e)
+        out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
     }
   }
 
  private:
-  static constexpr std::uint8_t kFull = 1, kCoded = 2;
+  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4;
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
+  int entries_of(std::size_t group) const {
+    return with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
+  }
+
+  /// What gather does for lanes with codes, group by group, since cells side by side mostly have
+  /// parents side by side; zero in the others. Returns how many entries it wrote.
+  int gather_codes(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
+    CodeLanes codes[kernels::kEntries];
+    alignas(kPackBytes) S unit[P::kLanes] = {};
+    int count = 0;
+    for (int k = 0; k < P::kLanes; ++k) {
+      if (lanes[k] < 0) continue;
+      const std::size_t group = static_cast<std::size_t>(lanes[k]) / kGroup;
+      if (!is_coded(group) || (traits_[group] & kNone) != 0) continue;
+      unit[k] = unit_[static_cast<std::size_t>(lanes[k])];
+      bool seen = false;  // this group came with an earlier lane
+      for (int j = 0; j < k; ++j)
+        seen = seen || (lanes[j] >= 0 && static_cast<std::size_t>(lanes[j]) / kGroup == group);
+      if (seen) continue;
+      LanePicker picker;
+      for (int j = k; j < P::kLanes; ++j)
+        if (lanes[j] >= 0 && static_cast<std::size_t>(lanes[j]) / kGroup == group)
+          picker.pick(j, lanes[j] % kGroup);
+      const std::int16_t* from = codes_.data() + kGroup * std::size_t{begin_[group]};
+      const bool first = count == 0;
+      count = entries_of(group);  // of all groups with codes alike
+      for (int e = 0; e < count; ++e) picker.add(from + kGroup * e, first, codes[e]);
+    }
+    const P units = load_pack(unit);
+    for (int e = 0; e < count; ++e) out[e] = units * widened(codes[e].at);
+    return count;
+  }
 
   void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
     P greatest{};

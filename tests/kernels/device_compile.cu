@@ -15,6 +15,7 @@
 #include "kernels/relax.hpp"
 #include "kernels/residual.hpp"
 #include "kernels/rotation.hpp"
+#include "kernels/slot_diagonal.hpp"
 #include "kernels/surface.hpp"
 #include "kernels/transfer.hpp"
 
@@ -83,6 +84,13 @@ __global__ void touch_modes(const FinestChild<T>* finest, T* corners, T* matrice
   blocks[cell] = D[0];
   mode_diagonal_blocks<with_translations>(matrix, D);
   blocks[cell] += D[0];
+  T m[kCorners];
+  slot_modes(static_cast<FoldCode>(present), cell % kCorners, m);
+  stored_slot_block<with_translations>(matrix, m, D[0]);
+  finest_slot_block(R, children[0].stiffness, children[0].mass, constants,
+                    slot_gram(m, constants.mass), D[1]);
+  blocks[cell] += D[0];
+  blocks[cell] += D[1];
   Vec3<T> f[kCorners];
   for (int i = 0; i < kCorners; ++i) f[i] = u[kCorners * cell + i];
   apply_mode_matrix<with_translations>(matrix, f, f);

@@ -8,6 +8,7 @@
 #include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/mode_coarsen.hpp"
+#include "kernels/slot_diagonal.hpp"
 #include "kernels/transfer.hpp"
 #include "tests/kernels/kernel_values.hpp"
 
@@ -439,6 +440,41 @@ TEST(DiagonalBlocks, OfAFinestCellNeedNoMatrix) {
       kernels::finest_diagonal_blocks(to_matrix(cell.rotation), cell.stiffness, cell.mass,
                                       kernels::mode_constants(kPoisson, model), D);
       EXPECT_LT(block_error(D, corner_matrix(cell, model)), kRoundOff);
+    }
+}
+
+/// Of the matrix over slots.
+Packed folded(const Packed& corners, kernels::FoldCode code) {
+  double w[8][8];
+  kernels::fold_weights(code, w);
+  Packed slots(kEntries, 0);
+  kernels::coarsen_cell(corners.data(), w, slots.data());
+  return slots;
+}
+
+TEST(DiagonalBlocks, AtSlotsNeedOnlyTheModesOfWhatASlotMoves) {
+  Random random(84);
+  for (int octant = 0; octant < 8; ++octant)
+    for (int hanging = 0; hanging < 256; ++hanging) {
+      const kernels::FoldCode code = kernels::fold_code(hanging, octant);
+      if (!kernels::fold_is_valid(code)) continue;
+      const MassModel model = kMassModels[hanging % 2];
+      const FinestChild<double> cell = random_family(random, 255, hanging % 3 != 0).child[0];
+      const ModeConstants<double> constants = kernels::mode_constants(kPoisson, model);
+      const Packed corners = corner_matrix(cell, model), slots = folded(corners, code);
+      Sym3<double> finest[8], stored[8], regular[8];
+      kernels::finest_diagonal_blocks(to_matrix(cell.rotation), cell.stiffness, cell.mass,
+                                      constants, regular);
+      for (int slot = 0; slot < 8; ++slot) {
+        double m[8];
+        kernels::slot_modes(code, slot, m);
+        kernels::stored_slot_block<true>(to_modes_of(corners).data(), m, stored[slot]);
+        kernels::finest_slot_block(to_matrix(cell.rotation), cell.stiffness, cell.mass, constants,
+                                   kernels::slot_gram(m, constants.mass), finest[slot]);
+        if (!kernels::is_folded_slot(code, slot)) stored[slot] = regular[slot];
+      }
+      EXPECT_LT(block_error(finest, slots), kRoundOff) << code;
+      EXPECT_LT(block_error(stored, slots), kRoundOff) << code;
     }
 }
 

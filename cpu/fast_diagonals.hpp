@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+//
+// Diagonal blocks of groups of eight cells, added to points of their patch: loading and storing of
+// lanes, no loops over groups and no threads.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "cpu/fast_kernels.hpp"
+#include "kernels/slot_diagonal.hpp"
+
+namespace kerf::cpu {
+
+/// Symmetric blocks of points, as two records.
+template <class S>
+struct BlockPoints {
+  S *upper, *lower;  // xx xy xz, yy yz zz
+
+  void add(const std::uint16_t* points, const kernels::Sym3<Pack<S>>& b) const {
+    add_to_points(upper, points, kernels::Vec3<Pack<S>>{b.xx, b.xy, b.xz});
+    add_to_points(lower, points, kernels::Vec3<Pack<S>>{b.yy, b.yz, b.zz});
+  }
+};
+
+/// What folds do to slots, by fold code: each of the 144 that there are has a place.
+template <class S>
+class SlotTable {
+ public:
+  explicit SlotTable(kernels::MassModel model) {
+    const auto constants = kernels::mode_constants<double>(0, model);
+    places_.fill(0);
+    add(0, constants.mass);
+    for (int octant = 0; octant < 8; ++octant)
+      for (int hanging = 1; hanging < 256; ++hanging) {
+        const kernels::FoldCode code = kernels::fold_code(hanging, octant);
+        if (!kernels::fold_is_valid(code)) continue;
+        places_[code] = static_cast<std::uint8_t>(folded_.size());
+        add(code, constants.mass);
+      }
+  }
+
+  /// The fold of a cell, in the table.
+  std::size_t place(kernels::FoldCode code) const {
+    return kernels::has_hanging(code) ? places_[code % places_.size()] : 0;
+  }
+  /// Slots that move other corners than their own, as bits.
+  unsigned folded(std::size_t place) const { return folded_[place]; }
+
+  /// Of one slot of the cells in the lanes.
+  void modes(const std::uint8_t* places, int slot, Pack<S> (&out)[8]) const {
+    alignas(kPackBytes) S m[8][Pack<S>::kLanes];
+    for (int k = 0; k < Pack<S>::kLanes; ++k)
+      for (std::size_t s = 0; s < 8; ++s) m[s][k] = modes_[8 * places[k] + std::size_t(slot)][s];
+    for (int s = 0; s < 8; ++s) out[s] = load_pack(m[s]);
+  }
+  void gram(const std::uint8_t* places, int slot, kernels::SlotGram<Pack<S>>& out) const {
+    std::uint16_t at[Pack<S>::kLanes];
+    alignas(kPackBytes) S mass[Pack<S>::kLanes];
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+      at[k] = static_cast<std::uint16_t>(2 * (8 * places[k] + slot));
+      mass[k] = mass_[8 * places[k] + std::size_t(slot)];
+    }
+    kernels::Vec3<Pack<S>> upper, lower;
+    gather_points(gradients_[0].s, at, upper);
+    gather_points(gradients_[1].s, at, lower);
+    out.gradients = {upper.x, upper.y, upper.z, lower.x, lower.y, lower.z};
+    out.mass = load_pack(mass);
+  }
+
+ private:
+  struct alignas(4 * sizeof(S)) Record4 {
+    S s[4];
+  };
+
+  void add(kernels::FoldCode code, const double (&mass)[4]) {
+    unsigned folded = 0;
+    for (int slot = 0; slot < 8; ++slot) {
+      double m[8];
+      kernels::slot_modes(code, slot, m);
+      const auto [G, inertia] = kernels::slot_gram(m, mass);
+      if (kernels::is_folded_slot(code, slot)) folded |= 1U << slot;
+      modes_.emplace_back();
+      for (std::size_t s = 0; s < 8; ++s) modes_.back()[s] = static_cast<S>(m[s]);
+      gradients_.push_back({{S(G.xx), S(G.xy), S(G.xz), 0}});
+      gradients_.push_back({{S(G.yy), S(G.yz), S(G.zz), 0}});
+      mass_.push_back(static_cast<S>(inertia));
+    }
+    folded_.push_back(static_cast<std::uint8_t>(folded));
+  }
+
+  std::array<std::uint8_t, 2048> places_;  // per code
+  std::vector<std::uint8_t> folded_;
+  std::vector<std::array<S, 8>> modes_;  // [place][slot]
+  std::vector<Record4> gradients_;       // two for each slot
+  std::vector<S> mass_;
+};
+
+/// The folds of the cells in some lanes, in the table; and the slots that some fold changes.
+template <class S>
+struct GroupFold {
+  std::uint8_t places[Pack<S>::kLanes];
+  unsigned folded = 0;
+  const std::uint16_t* slots;  // points
+
+  GroupFold(const PatchedLevel& level, const SlotTable<S>& table, std::size_t group, int first)
+      : slots(level.slots.data() + 64 * static_cast<std::size_t>(level.slots_at[group]) + first) {
+    const std::int32_t* cells = level.cell.data() + kGroup * group + first;
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+      const std::size_t place = cells[k] < 0 ? 0 : table.place(level.level->fold[cells[k]]);
+      places[k] = static_cast<std::uint8_t>(place);
+      folded |= table.folded(place);
+    }
+  }
+  bool changes(int slot) const { return ((folded >> slot) & 1) != 0; }
+};
+
+/// Diagonal blocks at the vertices of a group of level 0. Lanes without a cell have blocks too, at
+/// the point that is nothing.
+template <class S>
+void add_finest_diagonals(const PatchedLevel& level, const FinestValues<S>& values,
+                          const OperatorScale& scale, const SlotTable<S>& table, std::size_t group,
+                          const BlockPoints<S>& to) {
+  using P = Pack<S>;
+  const CellKind& kind = level.kinds[level.kind[group]];
+  const kernels::ModeConstants<P>& constants = values.materials[kind.material].modes;
+  const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
+  for_packs<S>([&](int first) {
+    const auto R = kernels::to_matrix(values.quaternion(group, first));
+    kernels::Sym3<P> blocks[8];
+    kernels::finest_diagonal_blocks(R, stiffness, mass, constants, blocks);
+    if (!level.folded(group)) {
+      for (int i = 0; i < 8; ++i) to.add(corner_points(level, group, first, i), blocks[i]);
+      return;
+    }
+    const GroupFold<S> fold(level, table, group, first);
+    for (int slot = 0; slot < 8; ++slot) {
+      if (fold.changes(slot)) {
+        kernels::SlotGram<P> gram;
+        table.gram(fold.places, slot, gram);
+        kernels::finest_slot_block(R, stiffness, mass, constants, gram, blocks[slot]);
+      }
+      to.add(fold.slots + kGroup * slot, blocks[slot]);
+    }
+  });
+}
+
+/// The same for a group of a stored level.
+template <class S>
+void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& matrices,
+                          const SlotTable<S>& table, std::size_t group, const BlockPoints<S>& to) {
+  using P = Pack<S>;
+  const auto add = [&](const std::uint16_t* points, const P& unit, const kernels::Sym3<P>& b) {
+    to.add(points, {unit * b.xx, unit * b.xy, unit * b.xz, unit * b.yy, unit * b.yz, unit * b.zz});
+  };
+  for_packs<S>([&](int first) {
+    matrices.read(group, first, [&](const auto& entries, const P& unit, auto translations) {
+      kernels::Sym3<P> blocks[8];
+      if (!level.folded(group)) {
+        kernels::mode_diagonal_blocks<translations()>(entries, blocks);
+        for (int i = 0; i < 8; ++i) add(corner_points(level, group, first, i), unit, blocks[i]);
+        return;
+      }
+      P all[kernels::kStoredEntries<translations()>];
+      for (int e = 0; e < kernels::kStoredEntries<translations()>; ++e) all[e] = entries[e];
+      kernels::mode_diagonal_blocks<translations()>(all, blocks);
+      const GroupFold<S> fold(level, table, group, first);
+      for (int slot = 0; slot < 8; ++slot) {
+        if (fold.changes(slot)) {
+          P m[8];
+          table.modes(fold.places, slot, m);
+          kernels::stored_slot_block<translations()>(all, m, blocks[slot]);
+        }
+        add(fold.slots + kGroup * slot, unit, blocks[slot]);
+      }
+    });
+  });
+}
+
+}  // namespace kerf::cpu

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include "cpu/fronts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace kerf::cpu {
+namespace {
+
+constexpr std::size_t kLeaf = 8;  // vertices that are not divided
+
+/// Whether a vertex takes no part: its row is that of the identity.
+bool is_held(const Level& level, int vertex) { return level.fixed[vertex] == 7; }
+
+class Dissection {
+ public:
+  Dissection(const Level& level, const AssembledLevel& matrix, std::vector<Front>& out)
+      : level_(level), matrix_(matrix), out_(out), inside_(level.point.size(), 0) {
+    least_.resize(inside_.size());
+  }
+
+  void divide(std::vector<int> vertices) {
+    if (vertices.empty()) return;
+    std::vector<int> low, high, between;
+    if (vertices.size() > kLeaf) split(vertices, low, high, between);
+    if (low.empty() || high.empty()) return add(std::move(vertices));
+    divide(std::move(low));
+    divide(std::move(high));
+    add(std::move(between));
+  }
+
+ private:
+  int at(int vertex, std::size_t axis) const { return level_.point[vertex][axis]; }
+
+  struct Plane {
+    std::size_t axis = 0;
+    int at = 0;
+    double cost = HUGE_VAL;
+  };
+
+  /// Low ones lie before the plane. Of the others, those that touch low ones lie between.
+  void split(const std::vector<int>& vertices, std::vector<int>& low, std::vector<int>& high,
+             std::vector<int>& between) {
+    Plane best;
+    for (std::size_t axis = 0; axis < 3; ++axis) look_along(axis, vertices, best);
+    if (best.cost == HUGE_VAL) return;
+    find_least(best.axis, vertices);
+    for (const int v : vertices)
+      (at(v, best.axis) < best.at ? low : least_[v] < best.at ? between : high).push_back(v);
+  }
+
+  /// Of each vertex, the least place of those that it touches.
+  void find_least(std::size_t axis, const std::vector<int>& vertices) {
+    for (const int v : vertices) inside_[v] = 1, least_[v] = at(v, axis);
+    for (const int v : vertices)
+      for (int k = matrix_.column_begin[3 * v]; k < matrix_.column_begin[3 * v + 1]; k += 3) {
+        const int w = matrix_.row[k] / 3;
+        if (inside_[w] == 0) continue;
+        least_[v] = std::min(least_[v], at(w, axis));
+        least_[w] = std::min(least_[w], at(v, axis));
+      }
+    for (const int v : vertices) inside_[v] = 0;
+  }
+
+  /// The fewest between, for what they divide.
+  void look_along(std::size_t axis, const std::vector<int>& vertices, Plane& best) {
+    find_least(axis, vertices);
+    int first = INT32_MAX, last = INT32_MIN;
+    for (const int v : vertices) {
+      first = std::min(first, at(v, axis));
+      last = std::max(last, at(v, axis));
+    }
+    const auto planes = static_cast<std::size_t>(last - first) + 2;
+    std::vector<int> before(planes, 0), between(planes, 0);  // changes from plane to plane
+    for (const int v : vertices) {
+      ++before[at(v, axis) - first + std::size_t{1}];
+      ++between[least_[v] - first + std::size_t{1}];
+      --between[at(v, axis) - first + std::size_t{1}];
+    }
+    int lower = 0, middle = 0;
+    for (std::size_t p = 0; p + 1 < planes; ++p) {
+      lower += before[p];
+      middle += between[p];
+      const int upper = static_cast<int>(vertices.size()) - lower - middle;
+      if (lower == 0 || upper <= 0) continue;
+      const double cost = static_cast<double>(middle) / std::min(lower, upper);
+      if (cost < best.cost) best = {axis, first + static_cast<int>(p), cost};
+    }
+  }
+
+  void add(std::vector<int> vertices) {
+    if (vertices.empty()) return;
+    Front front;
+    front.vertices = std::move(vertices);
+    out_.push_back(std::move(front));
+  }
+
+  const Level& level_;
+  const AssembledLevel& matrix_;
+  std::vector<Front>& out_;
+  std::vector<char> inside_;
+  std::vector<int> least_;
+};
+
+/// Rows of all fronts, and where they are in the front above.
+class Linking {
+ public:
+  Linking(const AssembledLevel& matrix, Fronts& out)
+      : matrix_(matrix), out_(out), front_of_(matrix.unknowns() / 3, -1), order_(front_of_.size()) {
+    int next = 0;
+    for (std::size_t f = 0; f < out.all.size(); ++f)
+      for (const int v : out.all[f].vertices) {
+        front_of_[v] = static_cast<int>(f);
+        order_[v] = next++;
+      }
+    place_.resize(front_of_.size());
+    list_entries();
+    for (int f = 0; f < static_cast<int>(out.all.size()); ++f) link(f);
+  }
+
+ private:
+  /// Each scalar of the matrix goes to the front that is eliminated first.
+  void list_entries() {
+    for (int column = 0; column < matrix_.unknowns(); ++column)
+      for (int k = matrix_.column_begin[column]; k < matrix_.column_begin[column + 1]; ++k) {
+        int first = column, last = matrix_.row[k];
+        if (front_of_[first / 3] < 0 || front_of_[last / 3] < 0) continue;
+        if (order_[last / 3] < order_[first / 3]) std::swap(first, last);
+        Front& front = out_.all[front_of_[first / 3]];
+        front.entries.push_back({k, last, first});  // scalars, for now
+        if (front_of_[last / 3] != front_of_[first / 3]) front.rows.push_back(last / 3);
+      }
+  }
+
+  void link(int f) {
+    Front& front = out_.all[f];
+    for (const int child : front.below) {
+      for (const int v : out_.all[child].rows)
+        if (front_of_[v] != f) front.rows.push_back(v);
+      front.depth = std::max(front.depth, out_.all[child].depth + 1);
+    }
+    std::sort(front.rows.begin(), front.rows.end(),
+              [&](int v, int w) { return order_[v] < order_[w]; });
+    front.rows.erase(std::unique(front.rows.begin(), front.rows.end()), front.rows.end());
+
+    int next = 0;
+    for (const int v : front.vertices) place_[v] = next, next += 3;
+    next = front.padded_columns();
+    for (const int v : front.rows) place_[v] = next, next += 3;
+    for (Front::Entry& entry : front.entries) {
+      entry.row = place_[entry.row / 3] + entry.row % 3;
+      entry.column = place_[entry.column / 3] + entry.column % 3;
+      if (entry.row < entry.column) std::swap(entry.row, entry.column);
+    }
+    for (const int child : front.below)
+      for (const int v : out_.all[child].rows) out_.all[child].row_place.push_back(place_[v]);
+    front.at = out_.entries;
+    out_.entries += static_cast<std::size_t>(front.height()) * front.padded_columns();
+    front.pivots_at = out_.pivots;
+    out_.pivots += front.padded_columns();
+    if (!front.rows.empty()) out_.all[front_of_[front.rows[0]]].below.push_back(f);
+    if (out_.by_depth.size() <= static_cast<std::size_t>(front.depth))
+      out_.by_depth.resize(front.depth + std::size_t{1});
+    out_.by_depth[front.depth].push_back(f);
+  }
+
+  const AssembledLevel& matrix_;
+  Fronts& out_;
+  std::vector<int> front_of_, order_, place_;  // per vertex
+};
+
+}  // namespace
+
+Fronts::Fronts(const Level& level, const AssembledLevel& matrix) {
+  std::vector<int> vertices;
+  for (int v = 0; v < level.vertices(); ++v)
+    if (!is_held(level, v)) vertices.push_back(v);
+  Dissection(level, matrix, all).divide(std::move(vertices));
+  Linking(matrix, *this);
+}
+
+}  // namespace kerf::cpu

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+//
+// The structure of a sparse Cholesky factor in dense pieces: fronts, for the coarsest level.
+//
+// A box of vertices is cut in the middle, along its longest axis, by the vertices that touch the
+// other half, and so on with the halves. What is left in the end, and each cut, is a front: its
+// columns are eliminated together, from a dense matrix over them and over the rows below in which
+// they, or the fronts below them, have entries.
+//
+// Layout  A front has its columns first, up to a multiple of four, then its rows, up to a multiple
+//         of four: `height` places. What is between has ones on the diagonal and zeros else.
+// Source  George 1973 (nested dissection); Duff, Reid 1983 (multifrontal).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/levels/hierarchy.hpp"
+#include "core/solve/sparse_cholesky.hpp"
+
+namespace kerf::cpu {
+
+struct Front {
+  struct Entry {
+    int value;        // of the assembled level
+    int row, column;  // places, row >= column
+  };
+  std::vector<int> vertices;   // columns: 3 times 3 * vertex + component
+  std::vector<int> rows;       // vertices, each eliminated by a later front
+  std::vector<int> row_place;  // per vertex in rows: the place of its x in the front above
+  std::vector<Entry> entries;
+  std::vector<int> below;     // fronts, rising
+  std::size_t at = 0;         // of its columns in the factor
+  std::size_t pivots_at = 0;  // of their pivots
+  int depth = 0;              // fronts below it have less
+
+  int columns() const { return 3 * static_cast<int>(vertices.size()); }
+  int padded_columns() const { return (columns() + 3) & ~3; }
+  int height() const { return (padded_columns() + 3 * static_cast<int>(rows.size()) + 3) & ~3; }
+};
+
+struct Fronts {
+  std::vector<Front> all;                  // in the order of elimination
+  std::vector<std::vector<int>> by_depth;  // those of one depth need nothing of each other
+  std::size_t entries = 0, pivots = 0;     // of the factor
+
+  Fronts() = default;
+  Fronts(const Level& level, const AssembledLevel& matrix);
+};
+
+}  // namespace kerf::cpu
