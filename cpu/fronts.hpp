@@ -9,7 +9,7 @@
 //
 // Layout  A front has its columns first, up to a multiple of four, then its rows, up to a multiple
 //         of four: `height` places. What is between has ones on the diagonal and zeros else.
-// Source  George 1973 (nested dissection); Duff, Reid 1983 (multifrontal).
+// Source  [G73] for nested dissection, [DR83] for fronts.
 #pragma once
 
 #include <cstddef>

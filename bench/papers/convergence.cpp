@@ -34,7 +34,7 @@ void run_case(Context& context, const Problem& problem, double density, const ch
   context.doing(text(kName, ": ", one.name));
   std::vector<double> solution;
   {
-    Machine fast(problem, fast_backend(context.threads), density);
+    Machine fast(problem, fast_backend(context.all_threads), density);
     fast.find_solution();
     solution = fast.solution();
     const Course course = fast.run(default_solver(), {kCycles, 0, kFloor});
@@ -42,7 +42,7 @@ void run_case(Context& context, const Problem& problem, double density, const ch
         {kName, one.name, kKerfMethod, "rate", "1", kNone, course.rate(kFloor)});
     add_course(context, panel, one.name + ": Kerf", course);
   }
-  Machine plain(problem, reference_backend(context.threads), density);
+  Machine plain(problem, reference_backend(context.all_threads), density);
   plain.take_solution(std::move(solution));
   const Course course = plain.run(paper_solver(), {kCycles, 0, kFloor});
   context.results.add(

@@ -18,7 +18,8 @@ namespace kerf::papers {
 struct Context {
   bench::Size size = bench::Size::full;
   std::vector<std::filesystem::path> folders;  ///< of meshes
-  int threads = 1;
+  int threads = 1;      ///< where seconds count
+  int all_threads = 1;  ///< elsewhere
   int repeat = 3;
   double give_up = 60;                            ///< s: longest run of a slow solver
   Results results;                                ///< they are added here

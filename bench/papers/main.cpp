@@ -24,6 +24,7 @@ int measure(const Options& options) {
   context.size = options.size;
   context.folders = bench::mesh_folders(options.meshes);
   context.threads = options.threads;
+  context.all_threads = bench::cores();
   context.repeat = options.repeat;
   context.give_up = options.give_up;
   context.doing = [&](const std::string& what) { progress.show("kerf_papers: " + what); };

@@ -69,7 +69,7 @@ std::string usage() {
          "  --meshes FOLDER  with bunny00.off, armadillo.obj or .off, cheese.off, liver.obj\n"
          "                   (default: KERF_MESHES, then ../shared/meshes); what is missing is left\n"
          "                   out, and said\n"
-         "  --threads N      (default: 1, as in the papers)\n"
+         "  --threads N      where seconds count (default: 1, as in the papers)\n"
          "  --repeat N       runs of a time step, of which the fastest counts (default: 3)\n"
          "  --give-up S      longest run of a slow solver, s (default: 60)\n"
          "  --size small     bodies of some thousand cells, to try it\n"

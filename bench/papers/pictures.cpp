@@ -21,7 +21,7 @@ void run_body(Context& context, const BodyInfo& info) {
   std::unique_ptr<Backend> backend = fast_backend(context.threads);
   const Problem problem(*setup, backend.get());
   Machine machine(problem, std::move(backend), 1);
-  machine.find_solution();
+  machine.find_solution(Machine::kRough);
   const double step = machine.step_seconds(default_solver(), context.repeat);
   const auto add = [&](const char* quantity, const char* unit, double printed, double ours,
                        const char* method = "") {

@@ -160,8 +160,8 @@ double Machine::error_of(int x) {
   return std::sqrt(sum) / norm_;
 }
 
-void Machine::find_solution() {
-  constexpr double kGoal = 1e-11, kEnough = 1e-9;
+void Machine::find_solution(double goal) {
+  constexpr double kEnough = 100;  // times the goal: some slender bodies do not get nearer
   SolverSetup setup = default_solver();
   setup.max_cycles = 1000;
   solvers_.push_back(std::make_unique<LinearSolver>(*backend_, setup));
@@ -169,8 +169,8 @@ void Machine::find_solution() {
   solver.set_structure(problem_.hierarchy());
   solver.refresh();
   backend_->zero(0, solution_);
-  const SolveStats stats = solver.solve(right_, solution_, kGoal);
-  ensures(stats.residual <= kEnough,
+  const SolveStats stats = solver.solve(right_, solution_, goal);
+  ensures(stats.residual <= kEnough * goal,
           text("the solution that errors are measured by stops at a residual of ", stats.residual));
   std::vector<double> found(3 * problem_.vertices());
   backend_->read(0, solution_, found);

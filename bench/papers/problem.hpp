@@ -96,8 +96,11 @@ class Machine {
   /// `density`: as in Problem::scale.
   Machine(const Problem& problem, std::unique_ptr<Backend> backend, double density);
 
-  /// Solves to a true relative residual of 1e-10 or better. Errors are measured against this.
-  void find_solution();
+  /// Solves to a true relative residual of `goal`, or as far as rounding allows. Errors are
+  /// measured against this.
+  void find_solution(double goal = kExact);
+  static constexpr double kExact = 1e-11;
+  static constexpr double kRough = 1e-3;  ///< enough for a state whose rotations are no identity
   /// One that another backend found.
   void take_solution(std::vector<double> solution);
   const std::vector<double>& solution() const { return exact_; }
