@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <unistd.h>
-
 #include <cstdio>
 
 #include "app/commands.hpp"
@@ -8,6 +6,7 @@
 #include "bench/cutting/figures.hpp"
 #include "bench/cutting/options.hpp"
 #include "bench/cutting/scenes.hpp"
+#include "bench/progress.hpp"
 #include "core/base/error.hpp"
 
 namespace {
@@ -15,26 +14,6 @@ namespace {
 using namespace kerf;
 using namespace kerf::cutting;
 using bench::formatted;
-
-/// On a terminal, a line on standard error that says what runs.
-class Progress {
- public:
-  Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
-  ~Progress() { clear(); }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-
-  void show(const std::string& line) {
-    if (terminal_) std::fprintf(stderr, "\r%s\033[K", line.c_str());
-    std::fflush(stderr);
-  }
-  void clear() {
-    if (terminal_) std::fprintf(stderr, "\r\033[K");
-  }
-
- private:
-  bool terminal_;
-};
 
 void print_head() {
   std::printf("%-13s %-14s %5s %9s %9s %10s %6s %10s %6s %9s %7s %6s\n", "scene", "method", "size",
@@ -61,7 +40,7 @@ int measure(const Options& options) {
     if (!options.json.empty()) write_json(options.json, records, origin);
   };
   save();
-  Progress progress;
+  bench::Progress progress;
   int status = kDone;
   print_head();
   for (const std::string& name : options.scenes) {
