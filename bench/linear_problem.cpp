@@ -63,14 +63,17 @@ double LinearProblem::error(int x) const {
   return std::sqrt(sum) / norm_exact_;
 }
 
-// Level 0 does not depend on how cells merge above it, so that the hierarchy that converges serves
-// both.
+// Level 0 depends neither on how cells merge above it nor on the cycle, so that the default serves
+// those that hardly converge, or whose cycles stand alone.
 void LinearProblem::solve_exactly() {
-  if (!setup_.solver.duplicate_cells) {
-    ProblemSetup duplicated = setup_;
-    duplicated.solver.duplicate_cells = true;
-    duplicated.solver.cycle = CycleType::automatic;
-    LinearProblem other(duplicated);
+  const SolverSetup& own = setup_.solver;
+  if (!own.duplicate_cells || own.method == SolverMethod::multigrid) {
+    ProblemSetup like = setup_;
+    like.solver = {};
+    like.solver.coarsest_vertices = own.coarsest_vertices;
+    like.solver.max_cycles = own.max_cycles;
+    like.solver.threads = own.threads;
+    LinearProblem other(like);
     other.solve_exactly();
     exact_ = std::move(other.exact_);
     norm_exact_ = other.norm_exact_;

@@ -77,7 +77,8 @@ bench::ChartPanel panel(const Table& table, const std::vector<Record>& rows, con
   const Abscissa& x = abscissa(table);
   double most = 0;
   for (const Record& r : rows) most = std::fmax(most, x.of(r));
-  bench::ChartPanel out{text(table.name, ": ", what), x.label, what, x.logarithmic, false, {}};
+  bench::ChartPanel out{
+      text(table.name, ": ", what), x.label, what, x.logarithmic, false, {}, true};
   for (const Record& r : rows) {
     const std::string name = curve(r, table.x);
     auto at = std::find_if(out.series.begin(), out.series.end(),
