@@ -84,12 +84,12 @@ std::vector<Case> cube(Size size) {
 
 std::vector<Case> depth(Size size) {
   std::vector<Case> out;
-  for (const int levels : {2, 3, 4, 5, 6})
+  for (const int levels : {2, 3, 4, 5})
     for (const CycleType cycle : {CycleType::v, CycleType::k}) {
-      if (size == Size::small && levels > 4) continue;
-      Case one = with(Maker(size).cube(64), cycle, SmootherType::chebyshev);
+      if (size == Size::small && levels > 4) continue;  // the cube has no more
+      Case one = with(Maker(size).cube(32), cycle, SmootherType::chebyshev);
       one.setup.solver.max_levels = levels;
-      one.setup.solver.coarsest_vertices = 20;
+      one.setup.solver.coarsest_vertices = 10;
       out.push_back(named(std::move(one), text(levels, ", ", name_of(cycle))));
     }
   return out;
