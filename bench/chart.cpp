@@ -77,9 +77,9 @@ std::string tick_text(double value) {
   return out;
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten.
-std::vector<double> tidy_ticks(double low, double high) {
-  const double least = (high - low) / (kMostTicks - 1);
+/// Multiples of 1, 2 or 5 times a power of ten; of at least `least_step`.
+std::vector<double> tidy_ticks(double low, double high, double least_step = 0) {
+  const double least = std::max(least_step, (high - low) / (kMostTicks - 1));
   const double power = std::pow(10, std::floor(std::log10(least)));
   double step = 10 * power;
   for (const double factor : {5.0, 2.0, 1.0})
@@ -96,11 +96,13 @@ struct Axis {
   bool logarithmic = true;
   double length = 0;
   double low = std::numeric_limits<double>::infinity(), high = -low;
+  bool whole = true;  // counts have no ticks between them
 
   bool takes(double value) const { return std::isfinite(value) && (!logarithmic || value > 0); }
   bool empty() const { return !(low <= high); }
   double place(double value) const { return logarithmic ? std::log10(value) : value; }
   void add(double value) {
+    whole = whole && value == std::floor(value);
     low = std::min(low, place(value));
     high = std::max(high, place(value));
   }
@@ -120,7 +122,7 @@ struct Axis {
 
   std::vector<double> ticks() const {
     if (empty()) return {};
-    if (!logarithmic) return tidy_ticks(low, high);
+    if (!logarithmic) return tidy_ticks(low, high, whole ? 1 : 0);
     std::vector<double> out = powers({1});
     if (out.size() < 2) out = powers({1, 2, 5});
     return out.size() < 2 ? tidy_ticks(std::pow(10, low), std::pow(10, high)) : out;
@@ -154,6 +156,7 @@ struct Axes {
             x.add(p.x);
             y.add(p.y);
           }
+    if (panel.from_zero && !panel.log_y && !y.empty()) y.add(0);
   }
   void widen() {
     x.widen();

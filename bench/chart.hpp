@@ -29,6 +29,7 @@ struct ChartPanel {
   std::string title, x_label, y_label;
   bool log_x = true, log_y = true;
   std::vector<ChartSeries> series;
+  bool from_zero = false;  ///< a linear y axis has 0 on it
 };
 
 struct Chart {

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <sstream>
 
 #include "core/base/error.hpp"
@@ -12,7 +11,25 @@
 namespace kerf::bench {
 namespace {
 
-std::string field(double value, int digits = 6) {
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> out(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
+      out.back() += line[i++];  // two quotes stand for one
+    else if (line[i] == '"')
+      quoted = !quoted;
+    else if (line[i] == ',' && !quoted)
+      out.emplace_back();
+    else
+      out.back() += line[i];
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string csv_field(double value, int digits) {
   if (std::isnan(value)) return "";
   std::ostringstream out;
   out.precision(digits);
@@ -20,15 +37,48 @@ std::string field(double value, int digits = 6) {
   return out.str();
 }
 
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> out;
-  std::istringstream in(line);
-  for (std::string part; std::getline(in, part, ',');) out.push_back(part);
-  if (!line.empty() && line.back() == ',') out.emplace_back();
-  return out;
+std::string csv_field(const std::string& words) {
+  if (words.find_first_of(",\"") == std::string::npos) return words;
+  std::string out = "\"";
+  for (const char c : words) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + '"';
 }
 
-}  // namespace
+CsvReader::CsvReader(const std::filesystem::path& file, const std::vector<std::string>& needed)
+    : file_(file), in_(file) {
+  expects(in_.good(), text(file.string(), ": cannot be read"));
+  std::string line;
+  std::getline(in_, line);
+  for (const std::string& name : split(line)) column_.emplace(name, column_.size());
+  for (const std::string& name : needed)
+    expects(column_.contains(name), text(file.string(), ":1: the column ", name, " is missing"));
+}
+
+bool CsvReader::next() {
+  std::string line;
+  if (!std::getline(in_, line)) return false;
+  ++line_;
+  fields_ = split(line);
+  return true;
+}
+
+std::string CsvReader::at(const std::string& column) const {
+  const auto found = column_.find(column);
+  return found != column_.end() && found->second < fields_.size() ? fields_[found->second] : "";
+}
+
+double CsvReader::value(const std::string& column) const {
+  const std::string words = at(column);
+  if (words.empty()) return kNone;
+  double result = 0;
+  const auto end = words.data() + words.size();
+  const auto [stop, error] = std::from_chars(words.data(), end, result);
+  expects(error == std::errc() && stop == end,
+          text(where(), ": ", column, " is no number: '", words, "'"));
+  return result;
+}
+
+std::string CsvReader::where() const { return text(file_.string(), ":", line_); }
 
 void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
                const Origin& origin) {
@@ -39,13 +89,14 @@ void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
          "launches,bytes_copied\n";
   for (const Row& r : rows)
     out << r.scene << ',' << r.backend << ',' << r.threads << ',' << r.precision << ','
-        << field(r.cells, kCountDigits) << ',' << field(r.vertices, kCountDigits) << ','
+        << csv_field(r.cells, kCountDigits) << ',' << csv_field(r.vertices, kCountDigits) << ','
         << (r.levels > 0 ? std::to_string(r.levels) : "") << ',' << r.phase << ','
-        << field(r.ms_min) << ',' << field(r.ms_median) << ',' << field(r.ns_per_cell) << ','
-        << field(r.gb_per_s) << ',' << field(r.residual) << ',' << r.state_hash << ','
-        << origin.commit << ',' << origin.build << ',' << origin.machine << ','
-        << field(r.of_ceiling, 3) << ',' << field(r.peak_bytes, kCountDigits) << ','
-        << field(r.launches, kCountDigits) << ',' << field(r.bytes_copied, kCountDigits) << '\n';
+        << csv_field(r.ms_min) << ',' << csv_field(r.ms_median) << ',' << csv_field(r.ns_per_cell)
+        << ',' << csv_field(r.gb_per_s) << ',' << csv_field(r.residual) << ',' << r.state_hash
+        << ',' << origin.commit << ',' << origin.build << ',' << origin.machine << ','
+        << csv_field(r.of_ceiling, 3) << ',' << csv_field(r.peak_bytes, kCountDigits) << ','
+        << csv_field(r.launches, kCountDigits) << ',' << csv_field(r.bytes_copied, kCountDigits)
+        << '\n';
   std::ofstream stream(file);
   stream << out.str();
   stream.close();
@@ -53,44 +104,19 @@ void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
 }
 
 std::vector<Row> read_csv(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  expects(in.good(), text(file.string(), ": cannot be read"));
-  std::string line;
-  std::getline(in, line);
-  std::map<std::string, std::size_t> column;
-  for (const std::string& name : split(line)) column.emplace(name, column.size());
-  for (const char* name :
-       {"scene", "backend", "threads", "precision", "cells", "phase", "ns_per_cell"})
-    expects(column.contains(name), text(file.string(), ":1: the column ", name, " is missing"));
-
+  CsvReader in(file, {"scene", "backend", "threads", "precision", "cells", "phase", "ns_per_cell"});
   std::vector<Row> out;
-  for (int number = 2; std::getline(in, line); ++number) {
-    const std::vector<std::string> parts = split(line);
-    const auto at = [&](const char* name) {
-      const auto found = column.find(name);
-      return found != column.end() && found->second < parts.size() ? parts[found->second]
-                                                                   : std::string();
-    };
-    const auto value = [&](const char* name) {
-      const std::string text_of = at(name);
-      if (text_of.empty()) return kNone;
-      double result = 0;
-      const auto end = text_of.data() + text_of.size();
-      const auto [stop, error] = std::from_chars(text_of.data(), end, result);
-      expects(error == std::errc() && stop == end,
-              text(file.string(), ":", number, ": ", name, " is no number: '", text_of, "'"));
-      return result;
-    };
+  while (in.next()) {
     Row row;
-    row.scene = at("scene");
-    row.backend = at("backend");
-    row.precision = at("precision");
-    row.phase = at("phase");
-    row.cells = value("cells");
-    row.ns_per_cell = value("ns_per_cell");
-    const double threads = value("threads");
+    row.scene = in.at("scene");
+    row.backend = in.at("backend");
+    row.precision = in.at("precision");
+    row.phase = in.at("phase");
+    row.cells = in.value("cells");
+    row.ns_per_cell = in.value("ns_per_cell");
+    const double threads = in.value("threads");
     expects(threads >= 1 && row.cells > 0 && row.ns_per_cell >= 0,
-            text(file.string(), ":", number, ": threads, cells or ns_per_cell is missing"));
+            text(in.where(), ": threads, cells or ns_per_cell is missing"));
     row.threads = static_cast<int>(threads);
     out.push_back(std::move(row));
   }

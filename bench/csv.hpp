@@ -5,7 +5,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,32 @@ struct Row {
 /// What all rows of a run share.
 struct Origin {
   std::string commit, build, machine;
+};
+
+/// A number as a field; empty if it is none.
+std::string csv_field(double value, int digits = 6);
+/// Words as a field: between quotes if they hold a comma or a quote.
+std::string csv_field(const std::string& words);
+
+/// The lines of a file whose first line names its columns.
+class CsvReader {
+ public:
+  /// @throws Error (bad_input) if the file cannot be read or lacks one of the columns.
+  CsvReader(const std::filesystem::path& file, const std::vector<std::string>& needed);
+  bool next();  ///< false at the end
+  /// The field of this line; empty if there is none.
+  std::string at(const std::string& column) const;
+  /// The same as a number, kNone if it is empty.
+  /// @throws Error (bad_input) that names the file and the line.
+  double value(const std::string& column) const;
+  std::string where() const;  ///< file:line, for errors
+
+ private:
+  std::filesystem::path file_;
+  std::ifstream in_;
+  std::map<std::string, std::size_t> column_;
+  std::vector<std::string> fields_;
+  int line_ = 1;
 };
 
 /// @throws Error (bad_input) if the file cannot be written.

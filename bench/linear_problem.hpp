@@ -18,14 +18,15 @@ struct ProblemSetup {
   double poisson = 0.3;
   std::vector<TriangleMesh> blades;  ///< applied in the reference state
   double courant = 0;                ///< > 0: time step in crossings of the cube by a shear wave
-  SolverSetup solver;
+  SolverSetup solver;  ///< method `multigrid`: the cycle stands alone, as that method runs it
 };
 
 /// What one cycle and CG with it do to the error.
 struct Convergence {
   double factor = 0;  ///< asymptotic factor of one cycle alone, in the 2-norm of the error
-  int cg_1e6 = -1, cg_1e10 = -1;  ///< iterations until the error is below; -1: not within the limit
-  double three_cycles = 0;        ///< error left after three cycles from zero
+  /// Iterations until the error is below; -1: not within the limit, or a cycle that stands alone.
+  int cg_1e6 = -1, cg_1e10 = -1;
+  double three_cycles = 0;  ///< error left after three cycles from zero
   double seconds_per_cycle = 0;
   std::vector<std::int32_t> vertices;  ///< of each level
 };
@@ -37,9 +38,12 @@ class LinearProblem {
   /// `error_of_cg`: also solve to rounding, to count iterations by the error.
   Convergence measure(bool error_of_cg = true);
   const Hierarchy& hierarchy() const { return hierarchy_; }
+  CycleType cycle_in_use() const { return solver_->cycle_in_use(); }
 
  private:
   double error(int x) const;  // relative to exact_
+  void solve_exactly();
+  void count_iterations(Convergence& out);
 
   ProblemSetup setup_;
   Hierarchy hierarchy_;

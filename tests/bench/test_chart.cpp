@@ -75,9 +75,18 @@ TEST(Chart, TicksAreTidy) {
   for (const char* tick : {">50<", ">100<", ">200<", ">0.7<"})
     EXPECT_NE(narrow.find(tick), std::string::npos) << tick;
 
-  const std::string linear = chart_svg(one_panel({{"a", {{-1, 0}, {1, 1e7}}}}, false, false));
+  const std::string linear = chart_svg(one_panel({{"a", {{-1, 0}, {0.9, 1e7}}}}, false, false));
   for (const char* tick : {">-0.5<", ">0<", ">0.5<", ">2M<", ">1e-5<"})
     EXPECT_EQ(linear.find(tick) != std::string::npos, tick != std::string(">1e-5<")) << tick;
+}
+
+TEST(Chart, CountsHaveNoTicksBetweenThemAndMayStartAtZero) {
+  Chart chart = one_panel({{"a", {{2, 5}, {3, 6}}}}, false, false);
+  EXPECT_EQ(chart_svg(chart).find(">2.5<"), std::string::npos);
+  EXPECT_EQ(chart_svg(chart).find(">0<"), std::string::npos);
+
+  chart.panels[0].from_zero = true;
+  EXPECT_NE(chart_svg(chart).find(">0<"), std::string::npos);
 }
 
 TEST(Chart, ASingleValueHasARange) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The small sizes of bench/convergence.cpp, as limits. docs/convergence.md has the large ones.
+// Sizes between those of tests/bench/test_convergence.cpp and of docs/convergence.md, as limits.
 #include <gtest/gtest.h>
 
 #include <numbers>
