@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "gpu/bodies/vectors.hpp"
+//
+// All code for the device. In one file, since both precisions share half of it, and since the compiler
+// takes ten seconds to read what each file includes.
 #include "gpu/cuda_backend.hpp"
 #include "gpu/cuda_device.cuh"
-#include "gpu/cuda_parts.hpp"
+#include "gpu/device_ceilings.hpp"
+#include "gpu/make_device_backend.hpp"
 
 namespace kerf {
 namespace {
@@ -50,8 +53,17 @@ std::unique_ptr<Backend> make_cuda_backend(const CudaOptions& options) {
     throw Error(ErrorKind::unavailable,
                 "no CUDA backend: " + problem + "; or set solver.backend = \"cpu\"");
   auto device = std::make_unique<gpu::CudaDevice>(options.device);
-  return options.single_cycle ? gpu::make_cuda_mixed(std::move(device))
-                              : gpu::make_cuda_double(std::move(device));
+  if (options.single_cycle) return gpu::make_device_backend<float>(std::move(device));
+  return gpu::make_device_backend<double>(std::move(device));
+}
+
+CudaCeilings measure_cuda_ceilings() {
+  // Beyond all caches, and long enough that a launch is no part of it.
+  constexpr std::int32_t kElements = 1 << 26, kThreads = 1 << 20, kRounds = 4096;
+  const std::string problem = cuda_problem();
+  if (!problem.empty()) throw Error(ErrorKind::unavailable, "no ceilings of a GPU: " + problem);
+  gpu::CudaDevice device(0);
+  return gpu::measure_ceilings(device, kElements, kThreads, kRounds);
 }
 
 }  // namespace kerf
