@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <numbers>
+#include <sstream>
 
 #include "app/scene.hpp"
 #include "core/base/error.hpp"
@@ -113,8 +114,11 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
 }
 
 std::vector<fs::path> mesh_folders(const std::string& given) {
-  if (!given.empty()) return {given};
   std::vector<fs::path> out;
+  std::istringstream list(given);
+  for (std::string folder; std::getline(list, folder, ':');)
+    if (!folder.empty()) out.emplace_back(folder);
+  if (!out.empty()) return out;
   if (const char* folder = std::getenv("KERF_MESHES"); folder != nullptr) out.emplace_back(folder);
   out.push_back(fs::path(KERF_SOURCE_DIR) / ".." / "shared" / "meshes");
   return out;

@@ -30,7 +30,8 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
                                           const std::vector<std::filesystem::path>& folders,
                                           std::string& missing);
 
-/// Where real meshes may be: `given` (--meshes) alone if it is not empty, else $KERF_MESHES, else
+/// Where real meshes may be: `given` (--meshes, with ':' between folders) alone if not empty, else
+/// $KERF_MESHES, else
 /// ../shared/meshes beside the sources.
 std::vector<std::filesystem::path> mesh_folders(const std::string& given);
 

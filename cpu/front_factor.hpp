@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "cpu/fronts.hpp"
+#include "cpu/patch_draft.hpp"
 #include "cpu/patch_sweep.hpp"
 
 namespace kerf::cpu {
@@ -108,13 +110,16 @@ class FrontFactor {
   bool factor(const AssembledLevel& matrix, int threads) {
     values_.resize(fronts_.entries);
     inverse_.resize(fronts_.pivots);
+    for (std::vector<double>& rest : rest_) rest = {};  // of one that failed
     std::atomic<bool> good = true;
-    for (const std::vector<int>& fronts : fronts_.by_depth) {
-      const auto count = static_cast<int>(fronts.size());
-#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) if (count > 1)
-      for (int n = 0; n < count; ++n)
-        if (good && !factor_front(matrix, fronts[n])) good = false;
-    }
+    using Buffer = PointBuffer<double>;
+    for (const std::vector<int>& fronts : fronts_.by_depth)
+      for_patches(
+          0, static_cast<std::int32_t>(fronts.size()), threads,
+          [] { return std::make_unique<Buffer>(); },
+          [&](std::int32_t n, Buffer& buffer) {
+            if (good && !factor_front(matrix, fronts[n], buffer)) good = false;
+          });
     return good;
   }
 
@@ -147,10 +152,9 @@ class FrontFactor {
     return static_cast<std::size_t>(height % 64 == 0 ? height + 4 : height);
   }
 
-  bool factor_front(const AssembledLevel& matrix, int n) {
+  bool factor_front(const AssembledLevel& matrix, int n, PointBuffer<double>& buffer) {
     const Front& front = fronts_.all[n];
     const int height = front.height(), padded = front.padded_columns();
-    thread_local PointBuffer<double> buffer;
     const std::size_t stride = stride_of(height), size = stride * static_cast<std::size_t>(height);
     const DenseFront dense(buffer.reserve(size), height, padded, stride);
     std::fill_n(dense.column(0), size, 0.0);

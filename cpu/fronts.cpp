@@ -84,7 +84,8 @@ class Dissection {
       middle += between[p];
       const int upper = static_cast<int>(vertices.size()) - lower - middle;
       if (lower == 0 || upper <= 0) continue;
-      const double cost = static_cast<double>(middle) / std::min(lower, upper);
+      // One more, so that of planes with none between the one nearest to the middle wins.
+      const double cost = (middle + 1.0) / std::min(lower, upper);
       if (cost < best.cost) best = {axis, first + static_cast<int>(p), cost};
     }
   }

@@ -2,10 +2,10 @@
 //
 // The structure of a sparse Cholesky factor in dense pieces: fronts, for the coarsest level.
 //
-// A box of vertices is cut in the middle, along its longest axis, by the vertices that touch the
-// other half, and so on with the halves. What is left in the end, and each cut, is a front: its
-// columns are eliminated together, from a dense matrix over them and over the rows below in which
-// they, or the fronts below them, have entries.
+// Vertices are parted by a plane, the one with the fewest vertices between for what it parts, and
+// so on with both parts; those on the far side that touch the near one lie between. What is left in
+// the end, and each cut, is a front: its columns are eliminated together, from a dense matrix over
+// them and over the rows below in which they, or the fronts below them, have entries.
 //
 // Layout  A front has its columns first, up to a multiple of four, then its rows, up to a multiple
 //         of four: `height` places. What is between has ones on the diagonal and zeros else.

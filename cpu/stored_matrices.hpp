@@ -4,12 +4,12 @@
 // side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
-// Codes   Products with stored matrices cost the bytes of their entries. In single precision those of
-//         level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over 32767. So
-//         they are off by at most 1.5e-5 of it, which a preconditioner does not notice. Held cells
-//         and loose ones are not coded: what supports leave of some is singular, and must not turn
-//         indefinite. Nor are coarser levels, where a few fine cells in the corner of a large one give entries over
-//         more orders of magnitude, and the bytes are few.
+// Codes   Products with stored matrices cost the bytes of their entries. In single precision those
+//         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
+//         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.
+//         Held cells and loose ones are not coded: what supports leave of some is singular, and
+//         must not turn indefinite. Nor are coarser levels, where a few fine cells in the corner of
+//         a large one give entries over more orders of magnitude, and the bytes are few.
 #pragma once
 
 #include <algorithm>

@@ -47,7 +47,7 @@ std::optional<SimulationSetup> make_setup(const BodyInfo& info, Grid grid, bench
                                           const std::vector<std::filesystem::path>& folders,
                                           std::string& missing);
 
-/// The unit of length of a comb: the cube of scenes/papers/cube_rods.toml without its blades.
+/// The cube of scenes/papers/cube_rods.toml without its blades.
 SimulationSetup cube(bench::Size size, int refinement);
 /// The same with `count` blades in each direction to half its height, turned by `angle`, rad.
 SimulationSetup cube_with_comb(bench::Size size, int refinement, int count, double angle);

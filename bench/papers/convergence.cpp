@@ -38,8 +38,7 @@ void run_case(Context& context, const Problem& problem, double density, const ch
     fast.find_solution();
     solution = fast.solution();
     const Course course = fast.run(default_solver(), {kCycles, 0, kFloor});
-    context.results.add(
-        {kName, one.name, kKerfMethod, "rate", "1", kNone, course.rate(kFloor)});
+    context.results.add({kName, one.name, kKerfMethod, "rate", "1", kNone, course.rate(kFloor)});
     add_course(context, panel, one.name + ": Kerf", course);
   }
   Machine plain(problem, reference_backend(context.all_threads), density);
@@ -83,7 +82,9 @@ void run_masses(Context& context) {
   for (const double density : {100.0, 10.0, 1.0, 0.1, 0.0}) {
     setup->time.mode = density == 0 ? TimeMode::statics : TimeMode::dynamic;
     run_case(context, Problem(*setup), density, "armadillo",
-             {density == 0 ? "static" : text("mass x ", density), density == 0 ? 0.85 : kNone});
+             {text("armadillo at half size: ",
+                   density == 0 ? std::string("static") : text("mass x ", density)),
+              density == 0 ? 0.85 : kNone});
   }
 }
 

@@ -15,8 +15,9 @@ struct Criterion {
   std::string id;         ///< as in the headings of docs/papers.md
   std::string statement;  ///< what must hold
   std::string seen;       ///< the figures that decide
-  /// Empty: the figures are not there.
+  /// Empty: some of the figures are not there, or those of small bodies, or it is for information.
   std::optional<bool> met;
+  bool is_report = false;  ///< nothing is decided: the paper's own figures differ
 };
 
 std::vector<Criterion> criteria(const Results& results);

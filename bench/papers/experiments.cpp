@@ -21,7 +21,8 @@ const std::vector<Experiment>& experiments() {
 void run(Context& context, const Experiment& experiment) {
   experiment.run(context);
   if (context.size == bench::Size::small)
-    for (Figure& figure : context.results.figures) figure.printed = kNone;
+    for (Figure& figure : context.results.figures)
+      if (figure.experiment == experiment.name) figure.printed = kNone;
 }
 
 std::optional<SimulationSetup> setup_of(Context& context, const BodyInfo& info, Grid grid) {

@@ -18,8 +18,8 @@ namespace kerf::papers {
 struct Context {
   bench::Size size = bench::Size::full;
   std::vector<std::filesystem::path> folders;  ///< of meshes
-  int threads = 1;      ///< where seconds count
-  int all_threads = 1;  ///< elsewhere
+  int threads = 1;                             ///< where seconds count
+  int all_threads = 1;                         ///< elsewhere
   int repeat = 3;
   double give_up = 60;                            ///< s: longest run of a slow solver
   Results results;                                ///< they are added here
@@ -27,8 +27,8 @@ struct Context {
   std::function<void(const std::string&)> note;   ///< told what was left out, and why
 };
 
-/// Runs one, and blanks what is printed of the paper's bodies where ours are small.
 struct Experiment;
+/// Runs one, and blanks what is printed of the paper's bodies where ours are small.
 void run(Context& context, const Experiment& experiment);
 
 /// The set-up of a body, prepared for `size`; empty, with a note, if its mesh is missing.

@@ -32,6 +32,9 @@ int measure(const Options& options) {
     progress.clear();
     std::fprintf(stderr, "kerf_papers: %s\n", what.c_str());
   };
+  // What other experiments found in that folder before stays.
+  if (std::filesystem::exists(std::filesystem::path(options.out) / kFiguresFile))
+    context.results = without(read_results(options.out), options.experiments);
   // Before anything is run, so that a folder that cannot be written is not found at the end, and
   // after each experiment, so that a run that is stopped leaves what it has.
   write_results(options.out, context.results, origin);

@@ -47,9 +47,11 @@ const std::map<std::string, Setter>& setters() {
 
 void check(const Options& o) {
   if (o.list || o.help) return;
-  expects(o.experiments.empty() != o.render.empty(),
-          "give one of --experiment and --render; --list names the experiments, --help all options");
+  expects(
+      o.experiments.empty() != o.render.empty(),
+      "give one of --experiment and --render; --list names the experiments, --help all options");
   expects(o.experiments.empty() == o.out.empty(), "--experiment and --out FOLDER go together");
+  expects(o.machine.find_first_of(",\"\n") == std::string::npos, "--machine must have no commas");
 }
 
 }  // namespace
@@ -63,11 +65,14 @@ Options parse_options(int argc, const char* const* argv) {
 
 std::string usage() {
   return "usage: kerf_papers --experiment A,B --out FOLDER   run; write CSV, Markdown and plots\n"
-         "       kerf_papers --render FOLDER                 Markdown and plots again, from the CSV\n"
+         "       kerf_papers --render FOLDER                 Markdown and plots again, from the "
+         "CSV\n"
          "       kerf_papers --list                          the tables and figures\n"
          "\n"
-         "  --meshes FOLDER  with bunny00.off, armadillo.obj or .off, cheese.off, liver.obj\n"
-         "                   (default: KERF_MESHES, then ../shared/meshes); what is missing is left\n"
+         "  --meshes A:B     folders with bunny00.off, armadillo.obj or .off, cheese.off, "
+         "liver.obj\n"
+         "                   (default: KERF_MESHES, then ../shared/meshes); what is missing is "
+         "left\n"
          "                   out, and said\n"
          "  --threads N      where seconds count (default: 1, as in the papers)\n"
          "  --repeat N       runs of a time step, of which the fastest counts (default: 3)\n"

@@ -40,7 +40,10 @@ class Rods {
       : edge_(setup.body.solid->bounds().extent().x), width_(edge_ / (count + 1)), count_(count) {}
 
   cutting::Beam beam(const Material& material, double acceleration) const {
-    return {0.5 * edge_, width_, width_, acceleration * material.density,
+    return {0.5 * edge_,
+            width_,
+            width_,
+            acceleration * material.density,
             {material.young, material.poisson, material.density}};
   }
   int rods() const { return (count_ + 1) * (count_ + 1); }
@@ -110,8 +113,8 @@ void run_rods(Context& context) {
     const Rods rods(setup, count);
     const double exact = rods.beam(setup.material, kSideways).tip();
     const double found = mean_deflection(problem, machine.solution(), rods);
-    context.results.add({kName, text("rods between ", count, " blades"), "", "deflection", "m",
-                         kNone, found});
+    context.results.add(
+        {kName, text("rods between ", count, " blades"), "", "deflection", "m", kNone, found});
     context.results.add({kName, text("rods between ", count, " blades"), "",
                          "deflection of a clamped beam", "m", kNone, exact});
   }

@@ -62,7 +62,8 @@ class Problem {
   CutTimes cut_times_;
 };
 
-/// How far a solver is after some time, its own set-up included.
+/// How far a solver is at some time, its own set-up included. The error falls at the end of a
+/// cycle.
 struct Sample {
   double seconds = 0;
   double error = 1;  ///< 2-norm, relative to that of the solution
@@ -78,11 +79,12 @@ struct Limits {
 struct Course {
   double structure = 0;  ///< s, of the set-up that topology alone asks for
   double values = 0;     ///< s, of the rest of the set-up
-  std::vector<Sample> samples;  ///< the first is after the set-up of structure; ascending
+  /// The first two are the ends of the set-up of structure and of all set-up; then one a cycle.
+  std::vector<Sample> samples;
 
-  /// By linear interpolation of its logarithm; 1 before the first cycle.
+  /// After the last cycle that has ended by then; no number where none of that time was run.
   double error_at(double seconds) const;
-  /// When the error falls below; no number: never.
+  /// The end of the cycle after which it is no more; no number: never.
   double seconds_to(double error) const;
   /// After so many cycles; no number if there were fewer.
   double error_after(int cycle) const;
@@ -107,20 +109,23 @@ class Machine {
 
   /// From zero. Needs  find_solution().
   Course run(const SolverSetup& solver, const Limits& limits);
-  /// Rotations, all matrices with their factor, three cycles, s; of the fastest of `repeat` runs,
-  /// fewer where one takes longer than some seconds. Needs  find_solution().
+  /// Rotations, all matrices with their factor, three cycles (of conjugate gradients where the
+  /// method is that), s; of the fastest of `repeat` runs after one that warms up. Of those of many
+  /// seconds there is no second. Needs  find_solution().
   double step_seconds(const SolverSetup& solver, int repeat);
 
  private:
   double error_of(int x);
   void reset();
+  LinearSolver& solver_of(const SolverSetup& setup);
+  void make_values(bool with_coarse);
 
   const Problem& problem_;
   std::unique_ptr<Backend> backend_;
   int right_ = -1, solution_ = -1;
   std::vector<double> exact_, now_;
   double norm_ = 0;
-  double load_seconds_ = 0;
+  double coarse_seconds_ = 0;  // to build all coarse levels, and load all levels
   std::vector<std::unique_ptr<LinearSolver>> solvers_;  // they keep vectors of the backend
 };
 

@@ -67,8 +67,7 @@ void body_table(const std::vector<Figure>& figures, std::ostringstream& out) {
         continue;
       }
       const std::string printed = number(found->printed), ours = number(found->ours);
-      out << ' '
-          << (is_printed(name) ? (printed.empty() ? "-" : printed) + " / " : std::string())
+      out << ' ' << (is_printed(name) ? (printed.empty() ? "-" : printed) + " / " : std::string())
           << (ours.empty() ? "-" : ours) << " |";
     }
     out << '\n';
@@ -77,15 +76,19 @@ void body_table(const std::vector<Figure>& figures, std::ostringstream& out) {
 
 // Where there are many methods, each has a row of its own.
 void methods_to_rows(std::vector<Figure>& figures) {
-  std::erase_if(figures, [](const Figure& f) { return f.method.empty(); });
-  for (Figure& f : figures) f.body += ": " + std::exchange(f.method, "");
+  for (Figure& f : figures)
+    if (const std::string method = std::exchange(f.method, ""); !method.empty())
+      f.body += ": " + method;
 }
 
 void criteria_table(const Results& results, std::ostringstream& out) {
   out << "\n### Criteria\n\n| | must hold | seen | |\n|---|---|---|---|\n";
   for (const Criterion& c : criteria(results))
     out << "| " << c.id << " | " << c.statement << " | " << c.seen << " | "
-        << (c.met ? (*c.met ? "met" : "**not met**") : "not run") << " |\n";
+        << (c.is_report ? "reported"
+            : c.met     ? (*c.met ? "met" : "**not met**")
+                        : "not run")
+        << " |\n";
 }
 
 Chart curves(const Results& results, const std::string& experiment) {
@@ -99,11 +102,11 @@ Chart curves(const Results& results, const std::string& experiment) {
     panel.y_label = "error";
     for (const Point& p : points) {
       if (p.panel != name) continue;
-      const auto found =
-          std::find_if(panel.series.begin(), panel.series.end(),
-                       [&](const ChartSeries& s) { return s.name == p.series; });
-      ChartSeries& series =
-          found != panel.series.end() ? *found : panel.series.emplace_back(ChartSeries{p.series, {}});
+      const auto found = std::find_if(panel.series.begin(), panel.series.end(),
+                                      [&](const ChartSeries& s) { return s.name == p.series; });
+      ChartSeries& series = found != panel.series.end()
+                                ? *found
+                                : panel.series.emplace_back(ChartSeries{p.series, {}});
       series.markers = false;
       series.points.push_back({p.x, p.y, ""});
       if (p.mark) series.crosses.push_back({p.x, p.y, "structural set-up"});
@@ -158,7 +161,8 @@ Chart cost_chart(const Results& results) {
                {"step on the uniform grid", "cells of the uniform grid", "uniform"}};
   for (const auto& grid : grids)
     for (const char* method : {kPaperMethod, kKerfMethod}) {
-      ChartSeries ours{text(grid.name, ", ", method), {}}, printed{text(grid.name, ", printed"), {}};
+      ChartSeries ours{text(grid.name, ", ", method), {}},
+          printed{text(grid.name, ", printed"), {}};
       ours.line = printed.line = false;
       for (const Figure& f : results.figures) {
         if (f.experiment != "table1" || f.quantity != grid.step || f.method != method) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bench/papers/results.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -84,14 +85,24 @@ double Results::ours(const std::string& experiment, const std::string& body,
   return found == nullptr ? kNone : found->ours;
 }
 
+Results without(Results results, const std::vector<std::string>& experiments) {
+  const auto is_one = [&](const auto& item) {
+    return std::find(experiments.begin(), experiments.end(), item.experiment) != experiments.end();
+  };
+  std::erase_if(results.figures, is_one);
+  std::erase_if(results.points, is_one);
+  return results;
+}
+
 void write_results(const fs::path& folder, const Results& results, const bench::Origin& origin) {
+  const std::string here =
+      text(plain(origin.commit), ',', plain(origin.build), ',', plain(origin.machine));
   std::ostringstream figures, curves;
   figures << kFigureHead << '\n';
   for (const Figure& f : results.figures)
     figures << plain(f.experiment) << ',' << plain(f.body) << ',' << plain(f.method) << ','
             << plain(f.quantity) << ',' << plain(f.unit) << ',' << field(f.printed) << ','
-            << field(f.ours) << ',' << origin.commit << ',' << origin.build << ','
-            << plain(origin.machine) << '\n';
+            << field(f.ours) << ',' << (f.origin.empty() ? here : f.origin) << '\n';
   curves << kCurveHead << '\n';
   for (const Point& p : results.points)
     curves << plain(p.experiment) << ',' << plain(p.panel) << ',' << plain(p.series) << ','
@@ -104,11 +115,11 @@ Results read_results(const fs::path& folder) {
   Results out;
   read(folder / kFiguresFile, kFigureHead, [&](const auto& p, const std::string& where) {
     out.add({p[0], p[1], p[2], p[3], p[4], number(p[5], where, "printed"),
-             number(p[6], where, "ours")});
+             number(p[6], where, "ours"), text(p[7], ',', p[8], ',', p[9])});
   });
   read(folder / kCurvesFile, kCurveHead, [&](const auto& p, const std::string& where) {
-    out.points.push_back({p[0], p[1], p[2], number(p[3], where, "x"), number(p[4], where, "y"),
-                          !p[5].empty()});
+    out.points.push_back(
+        {p[0], p[1], p[2], number(p[3], where, "x"), number(p[4], where, "y"), !p[5].empty()});
   });
   return out;
 }

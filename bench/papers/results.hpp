@@ -19,8 +19,9 @@ struct Figure {
   std::string body;
   std::string method;  ///< empty: it does not depend on one
   std::string quantity, unit;
-  double printed = kNone;  ///< in the paper; no number: not there
-  double ours = kNone;     ///< no number: left out
+  double printed = kNone;   ///< in the paper; no number: not there
+  double ours = kNone;      ///< no number: left out
+  std::string origin = "";  ///< the last columns of its line; empty: of this run
 };
 
 struct Point {
@@ -45,6 +46,9 @@ struct Results {
 /// Names of the files in a folder of results.
 inline constexpr const char* kFiguresFile = "papers.csv";
 inline constexpr const char* kCurvesFile = "papers-curves.csv";
+
+/// All but what some experiments found.
+Results without(Results results, const std::vector<std::string>& experiments);
 
 /// @throws Error (bad_input) if a file cannot be written.
 void write_results(const std::filesystem::path& folder, const Results& results,

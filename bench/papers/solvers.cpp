@@ -53,8 +53,8 @@ void run_panel(Context& context, const SimulationSetup& setup, const std::string
 
 }  // namespace
 
-// The cube of the paper, and at half its size, at which Cholesky fits; the armadillo at a half and a
-// quarter.
+// The cube of the paper, and at half its size, at which Cholesky fits; the armadillo at a half and
+// a quarter.
 void run_figure12(Context& context) {
   const struct {
     const char *name, *size;

@@ -50,7 +50,8 @@ void make_definite(std::span<double> packed, double rounding) {
   if (is_definite(matrix, rounding)) return;
 
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(matrix);
-  const double least = rounding * parts.eigenvalues().maxCoeff();
+  expects(parts.info() == Eigen::Success, "a cell matrix has entries that are not finite");
+  const double least = rounding * parts.eigenvalues().cwiseAbs().maxCoeff();
   matrix = parts.eigenvectors() * parts.eigenvalues().cwiseMax(least).asDiagonal() *
            parts.eigenvectors().transpose();
   for (int i = 0; i < n; ++i)

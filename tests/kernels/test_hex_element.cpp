@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-
 #include "kernels/corotate.hpp"
 #include "kernels/modes.hpp"
 #include "tests/kernels/kernel_values.hpp"
+#include "tests/oracle/system_oracle.hpp"
 
 namespace kerf::test {
 namespace {
@@ -55,7 +54,7 @@ TEST(HexStiffness, ScalesWithTheSide) {
 TEST(HexStiffness, HasSixZeroModesAndNoNegativeOne) {
   for (const double nu : kPoisson) {
     const Matrix24 K = dense(kernels::unit_hex_stiffness(nu));
-    const Vector24 values = Eigen::SelfAdjointEigenSolver<Matrix24>(K).eigenvalues();
+    const Vector24 values = oracle::eigenvalues(K);
     const double greatest = values[23];
     for (int i = 0; i < 6; ++i) EXPECT_LT(std::abs(values[i]), kSameSum * greatest);
     EXPECT_GT(values[6], 1e-3 * greatest);

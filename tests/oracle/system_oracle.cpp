@@ -215,6 +215,10 @@ void chebyshev(const Sparse& A, const Sparse& inverse, double lower, double uppe
   }
 }
 
+Vector eigenvalues(const Eigen::MatrixXd& A) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(A, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
 double largest_eigenvalue(const Sparse& A, const std::vector<std::uint8_t>& fixed) {
   const Free free(fixed);
   const auto n = static_cast<Eigen::Index>(free.unknown.size());

@@ -64,6 +64,10 @@ void gauss_seidel(const Sparse& A, const Sparse& inverse, const std::vector<std:
 void chebyshev(const Sparse& A, const Sparse& inverse, double lower, double upper, int degree,
                const Vector& f, Vector& u);
 
+/// Of a symmetric matrix, ascending. Here, since each file that has such a solver takes ten seconds
+/// to compile.
+Vector eigenvalues(const Eigen::MatrixXd& A);
+
 /// Largest eigenvalue of D^-1 A over the components that are not held.
 double largest_eigenvalue(const Sparse& A, const std::vector<std::uint8_t>& fixed);
 
