@@ -91,7 +91,7 @@ Values cell_ratios(const Results& results) {
   for (const Figure& f : results.figures) {
     const bool counts = f.quantity == "cells" || f.quantity == "cells of the uniform grid" ||
                         f.quantity == "cells after the cut";
-    const bool again = f.experiment == "pictures" && body(f.body).in_tables;
+    const bool again = counts && f.experiment == "pictures" && body(f.body).in_tables;
     if (counts && f.printed > 0 && f.experiment != "survey" && !again)
       out.add(f.body + ", " + f.quantity, f.ours / f.printed);
   }

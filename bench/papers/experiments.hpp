@@ -21,7 +21,7 @@ struct Context {
   int threads = 1;                             ///< where seconds count
   int all_threads = 1;                         ///< elsewhere
   int repeat = 3;
-  double give_up = 60;                            ///< s: longest run of a slow solver
+  double give_up = 30;  ///< s: longest run of a slow solver
   Results results;                                ///< they are added here
   std::function<void(const std::string&)> doing;  ///< told what runs now
   std::function<void(const std::string&)> note;   ///< told what was left out, and why

@@ -76,7 +76,7 @@ std::string usage() {
          "                   out, and said\n"
          "  --threads N      where seconds count (default: 1, as in the papers)\n"
          "  --repeat N       runs of a time step, of which the fastest counts (default: 3)\n"
-         "  --give-up S      longest run of a slow solver, s (default: 60)\n"
+         "  --give-up S      longest run of a slow solver, s (default: 30)\n"
          "  --size small     bodies of some thousand cells, to try it\n"
          "  --machine NAME   for the column of that name (default: from the processor)\n"
          "\n"

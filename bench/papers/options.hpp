@@ -18,7 +18,7 @@ struct Options {
   bench::Size size = bench::Size::full;
   int threads = 1;
   int repeat = 3;
-  double give_up = 60;  ///< s
+  double give_up = 30;  ///< s
 };
 
 /// @throws Error (bad_input) that names the option, and for an unknown name the nearest known one.

@@ -134,7 +134,20 @@ std::string markdown(const Results& results) {
 }
 
 Chart figure10_chart(const Results& results) {
-  Chart out = curves(results, "figure10");
+  // A panel for each body and solver.
+  const std::string kerf = text(": ", kKerfMethod);
+  Results parted;
+  for (Point p : results.points) {
+    const bool is_kerf = p.series.ends_with(kerf);
+    if (is_kerf) p.series.resize(p.series.size() - kerf.size());
+    if (const std::size_t at = p.series.find(": "); at != std::string::npos) {
+      p.panel = p.series.substr(0, at);
+      p.series = p.series.substr(at + 2);
+    }
+    p.panel += text(", ", is_kerf ? kKerfMethod : kPaperMethod);
+    parted.points.push_back(std::move(p));
+  }
+  Chart out = curves(parted, "figure10");
   out.title = "Error over cycles";
   for (ChartPanel& panel : out.panels) {
     panel.x_label = "cycles";
@@ -146,7 +159,13 @@ Chart figure10_chart(const Results& results) {
 Chart figure12_chart(const Results& results) {
   Chart out = curves(results, "figure12");
   out.title = "Error over time; crosses: the end of structural set-up";
-  for (ChartPanel& panel : out.panels) panel.x_label = "seconds";
+  const double least = 1e-4;  // s: where no structure is set up, the first point is at zero
+  for (ChartPanel& panel : out.panels) {
+    panel.x_label = "seconds";
+    for (ChartSeries& series : panel.series)
+      for (auto* points : {&series.points, &series.crosses})
+        std::erase_if(*points, [&](const auto& point) { return !(point.x >= least); });
+  }
   return out;
 }
 

@@ -72,6 +72,8 @@ TEST_P(PaperExperiments, GiveFiguresThatMeanSomething) {
       EXPECT_LT(f.ours, 1);
     }
   }
+  for (const Criterion& c : criteria(ran.results)) EXPECT_FALSE(c.met.has_value()) << c.statement;
+  EXPECT_NE(markdown(ran.results).find(GetParam().what), std::string::npos);
   if (std::string(GetParam().name) == "figure10") expect_duplication_to_help(ran.results);
 }
 
