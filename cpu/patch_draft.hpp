@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
@@ -61,12 +62,12 @@ template <class Make, class Body>
 void for_patches(std::int32_t begin, std::int32_t end, int threads, const Make& make,
                  const Body& body) {
   std::exception_ptr error;
+  std::atomic<bool> failed = false;
   const auto guarded = [&](const auto& part) {
     try {
       part();
     } catch (...) {
-#pragma omp critical(kerf_patch_error)
-      error = std::current_exception();
+      if (!failed.exchange(true)) error = std::current_exception();
     }
   };
   if (begin >= end) return;
