@@ -14,10 +14,8 @@
 namespace kerf::bench {
 namespace {
 
-LinkedOctree make_octree(const SimulationSetup& setup) {
-  const Lattice lattice =
-      make_lattice(setup.body.solid->bounds(), setup.body.resolution, setup.body.refinement);
-  LinkedOctree out(voxelise(*setup.body.solid, lattice), setup.body.refinement);
+LinkedOctree cut_octree(const SimulationSetup& setup) {
+  LinkedOctree out = uncut_octree(setup);
   std::int32_t id = 0;
   for (const CutSetup& blade : setup.cuts)
     cut(out, {}, blade.lines.empty() ? blade.mesh : sweep(blade.lines), ++id);
@@ -43,7 +41,7 @@ class Hash {
 
 }  // namespace
 
-Body::Body(SimulationSetup setup) : setup_(std::move(setup)), octree_(make_octree(setup_)) {}
+Body::Body(SimulationSetup setup) : setup_(std::move(setup)), octree_(cut_octree(setup_)) {}
 
 Hierarchy Body::build_levels(const LinkedOctree& octree) const {
   Hierarchy out;
@@ -109,6 +107,23 @@ void Body::place_blade() {
   const Vec3d u = (half / std::sqrt(1.04)) * Vec3d{0.2, 1, 0}, v{0, 0, half};  // off the grid
   blade_ = {{middle - u - v, middle + u - v, middle + u + v, middle - u + v},
             {{0, 1, 2}, {0, 2, 3}}};
+}
+
+LinkedOctree uncut_octree(const SimulationSetup& setup) {
+  const Lattice lattice =
+      make_lattice(setup.body.solid->bounds(), setup.body.resolution, setup.body.refinement);
+  std::vector<std::shared_ptr<const Solid>> regions;
+  for (const Region& region : setup.regions) regions.push_back(region.solid);
+  return LinkedOctree(voxelise(*setup.body.solid, lattice, regions), setup.body.refinement);
+}
+
+void follow(Backend& backend, Structure& structure, bool in_place) {
+  if (backend.can_update() && in_place) {
+    backend.update(structure.hierarchy(), structure.change());
+  } else {
+    structure.pack();
+    backend.load(structure.hierarchy());
+  }
 }
 
 std::uint64_t hash_of(const std::vector<double>& values) {

@@ -7,9 +7,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/backend.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/setup.hpp"
+#include "core/structure.hpp"
 
 namespace kerf::bench {
 
@@ -47,6 +49,11 @@ class Body {
   std::vector<Vec3d> bent_corners_;
   TriangleMesh blade_;
 };
+
+/// Of the voxels of a set-up, its regions included, before any blade.
+LinkedOctree uncut_octree(const SimulationSetup& setup);
+/// Lets a backend follow a blade that `structure` has followed; `in_place`: what it returned.
+void follow(Backend& backend, Structure& structure, bool in_place);
 
 /// Of the bits of all values, in their order.
 std::uint64_t hash_of(const std::vector<double>& values);

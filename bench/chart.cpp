@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iomanip>
 #include <limits>
 #include <sstream>
 #include <utility>
 
+#include "bench/csv.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf::bench {
@@ -387,10 +387,7 @@ std::string chart_svg(const Chart& chart) { return Drawing(chart).draw(); }
 
 void write_svg(const std::string& svg, const std::filesystem::path& file,
                const std::string& option) {
-  std::ofstream stream(file);
-  stream << svg;
-  stream.close();
-  expects(stream.good(), text(option, " ", file.string(), ": cannot be written"));
+  write_file(file, svg, option);
 }
 
 }  // namespace kerf::bench

@@ -44,6 +44,14 @@ std::string csv_field(const std::string& words) {
   return out + '"';
 }
 
+void write_file(const std::filesystem::path& file, const std::string& content,
+                const std::string& option) {
+  std::ofstream stream(file);
+  stream << content;
+  stream.close();
+  expects(stream.good(), text(option, " ", file.string(), ": cannot be written"));
+}
+
 CsvReader::CsvReader(const std::filesystem::path& file, const std::vector<std::string>& needed)
     : file_(file), in_(file) {
   expects(in_.good(), text(file.string(), ": cannot be read"));
@@ -97,10 +105,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<Row>& rows,
         << csv_field(r.of_ceiling, 3) << ',' << csv_field(r.peak_bytes, kCountDigits) << ','
         << csv_field(r.launches, kCountDigits) << ',' << csv_field(r.bytes_copied, kCountDigits)
         << '\n';
-  std::ofstream stream(file);
-  stream << out.str();
-  stream.close();
-  expects(stream.good(), text("--csv ", file.string(), ": cannot be written"));
+  write_file(file, out.str(), "--csv");
 }
 
 std::vector<Row> read_csv(const std::filesystem::path& file) {

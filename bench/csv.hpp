@@ -44,6 +44,10 @@ std::string csv_field(double value, int digits = 6);
 /// Words as a field: between quotes if they hold a comma or a quote.
 std::string csv_field(const std::string& words);
 
+/// @throws Error (bad_input) naming `option` if the file cannot be written.
+void write_file(const std::filesystem::path& file, const std::string& content,
+                const std::string& option);
+
 /// The lines of a file whose first line names its columns.
 class CsvReader {
  public:

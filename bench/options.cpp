@@ -70,11 +70,7 @@ const std::map<std::string, Setter>& setters() {
        [](Options& o, const std::string& v) { o.seconds = number("--seconds", v, 0.0, 1e6); }},
       {"--give-up",
        [](Options& o, const std::string& v) { o.give_up = number("--give-up", v, 0.0, 1e6); }},
-      {"--size",
-       [](Options& o, const std::string& v) {
-         o.size = choose("--size", "size", v, {"full", "small"}).front() == "small" ? Size::small
-                                                                                    : Size::full;
-       }},
+      {"--size", [](Options& o, const std::string& v) { o.size = size_named(v); }},
       {"--csv", [](Options& o, const std::string& v) { o.csv = v; }},
       {"--meshes", [](Options& o, const std::string& v) { o.meshes = v; }},
       {"--machine", [](Options& o, const std::string& v) { o.machine = v; }},

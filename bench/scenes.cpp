@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "app/scene.hpp"
+#include "bench/command_line.hpp"
 #include "core/base/error.hpp"
 #include "scenes/comb.hpp"
 
@@ -69,6 +70,12 @@ struct Sizes {
 };
 
 }  // namespace
+
+Size size_named(const std::string& name) {
+  const Names chosen = choose("--size", "size", name, {"full", "small"});
+  expects(chosen.size() == 1, "--size must be full or small");
+  return chosen[0] == "small" ? Size::small : Size::full;
+}
 
 const std::vector<SceneInfo>& scenes() {
   static const std::vector<SceneInfo> all{

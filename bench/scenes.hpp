@@ -22,6 +22,8 @@ const std::vector<SceneInfo>& scenes();
 
 /// `small`: the smallest size that still has all parts of the scene, for tests.
 enum class Size { full, small };
+/// @throws Error (bad_input) for a value of --size that is neither.
+Size size_named(const std::string& name);
 
 /// The scene at the given size; cuts are meant in the reference state. Empty if its mesh lies in
 /// none of `folders`; `missing` then names the file.

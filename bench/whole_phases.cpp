@@ -75,12 +75,7 @@ void run_cut(Trial& t) {
   run_cut_topology(t);
   t.surface->update(*t.octree, t.event);
   t.surface->bind(*t.octree);
-  if (t.backend().can_update() && t.in_place) {
-    t.backend().update(t.structure->hierarchy(), t.structure->change());
-  } else {
-    t.structure->pack();
-    t.backend().load(t.structure->hierarchy());
-  }
+  follow(t.backend(), *t.structure, t.in_place);
 }
 
 Outcome outcome_cut(Trial& t) {
@@ -190,7 +185,8 @@ std::vector<Phase> whole_phases() {
        outcome_cut, always({}), 1, true},
       {"solve", "values and linear solution to a true relative residual of 1e-8", prepare_solve,
        run_solve, outcome_solve, work_solve},
-      {"step", "rotations, matrices and diagonals, three cycles", prepare_step, run_step, outcome_step,
+      {"step", "rotations, matrices and diagonals, three cycles", prepare_step, run_step,
+       outcome_step,
        [](const Trial& t) { return t.is_paper() ? counts::kStepPaper : counts::kStep; }, 2},
   };
 }

@@ -15,19 +15,13 @@ namespace {
 
 using Setter = std::function<void(Options&, const std::string&)>;
 
-void set_size(Options& o, const std::string& size) {
-  expects(size == "full" || size == "small",
-          text("--size must be full or small, not '", size, "'"));
-  o.size = size == "small" ? bench::Size::small : bench::Size::full;
-}
-
 const std::map<std::string, Setter>& setters() {
   static const std::map<std::string, Setter> all{
       {"--table",
        [](Options& o, const std::string& v) {
          o.tables = bench::choose("--table", "table", v, bench::names_of(tables()));
        }},
-      {"--size", set_size},
+      {"--size", [](Options& o, const std::string& v) { o.size = bench::size_named(v); }},
       {"--threads",
        [](Options& o, const std::string& v) {
          o.threads = bench::number("--threads", v, 1, 1024);

@@ -3,7 +3,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 
 #include "core/base/error.hpp"
@@ -35,7 +34,7 @@ std::vector<std::int32_t> parted(const std::string& words, const std::string& wh
 
 void write_csv(const std::filesystem::path& file, const std::vector<Record>& records,
                const bench::Origin& origin) {
-  std::ofstream out(file);
+  std::ostringstream out;
   out << "table,case,body,cells,levels,vertices,hierarchy,cycle,smoother,sweeps,omega,poisson,"
          "courant,factor,cg_1e6,cg_1e10,three_cycles,seconds_per_cycle,commit,build,machine\n";
   for (const Record& r : records)
@@ -46,8 +45,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<Record>& rec
         << ',' << csv_field(r.cg_1e10) << ',' << csv_field(r.three_cycles) << ','
         << csv_field(r.seconds_per_cycle) << ',' << origin.commit << ',' << origin.build << ','
         << origin.machine << '\n';
-  out.close();
-  expects(out.good(), text("--csv ", file.string(), ": cannot be written"));
+  bench::write_file(file, out.str(), "--csv");
 }
 
 std::vector<Record> read_csv(const std::filesystem::path& file) {

@@ -53,8 +53,7 @@ void run_case(Context& context, const Problem& problem, double density, const ch
 
 SimulationSetup prepared(Context& context, SimulationSetup setup, bool duplicate) {
   setup.solver.duplicate_cells = duplicate;
-  if (context.size == bench::Size::small) setup.solver.coarsest_vertices = 100;
-  return setup;
+  return fitted(context, std::move(setup));
 }
 
 void run_cuts(Context& context) {

@@ -61,13 +61,14 @@ class Values {
   std::vector<std::pair<std::string, double>> all_;
 };
 
-using Of = double (*)(const Results&, const std::string& body);
+using Of = double (*)(const Results&, const std::string& body, const char* method);
 
 // One value for each body that the paper has in its tables.
-Values of_printed_bodies(const Results& results, const Of& of) {
+Values of_printed_bodies(const Results& results, const Of& of, const char* method) {
   Values out;
   for (const BodyInfo& info : bodies())
-    if (info.in_tables && info.printed.cells > 0) out.add(info.name, of(results, info.name));
+    if (info.in_tables && info.printed.cells > 0)
+      out.add(info.name, of(results, info.name, method));
   return out;
 }
 
@@ -98,32 +99,25 @@ Values cell_ratios(const Results& results) {
   return out;
 }
 
-template <int kMethod>
-double per_cell(const Results& r, const std::string& body) {
-  return 1e6 * r.ours("table1", body, kMethod == 0 ? kPaperMethod : kKerfMethod, "step") /
+double per_cell(const Results& r, const std::string& body, const char* method) {
+  return 1e6 * r.ours("table1", body, method, "step") /
          r.ours("table1", body, "", "cells after the cut");
 }
 
+double faster(const Results& r, const std::string& body, const char* method) {
+  return r.ours("table1", body, method, "step on the uniform grid") /
+         r.ours("table1", body, method, "step");
+}
+
 // How much faster the octree is, over how many cells fewer it has.
-template <int kMethod>
-double gain(const Results& r, const std::string& body) {
-  const char* method = kMethod == 0 ? kPaperMethod : kKerfMethod;
-  const double faster = r.ours("table1", body, method, "step on the uniform grid") /
-                        r.ours("table1", body, method, "step");
-  return faster / (r.ours("table1", body, "", "cells of the uniform grid") /
-                   r.ours("table1", body, "", "cells after the cut"));
+double gain(const Results& r, const std::string& body, const char* method) {
+  return faster(r, body, method) / (r.ours("table1", body, "", "cells of the uniform grid") /
+                                    r.ours("table1", body, "", "cells after the cut"));
 }
 
 double cells_before(const Results& r, const std::string& body) {
   return r.ours("table1", body, "", "cells") /
          r.ours("table1", body, "", "cells of the uniform grid");
-}
-
-template <int kMethod>
-double faster(const Results& r, const std::string& body) {
-  const char* method = kMethod == 0 ? kPaperMethod : kKerfMethod;
-  return r.ours("table1", body, method, "step on the uniform grid") /
-         r.ours("table1", body, method, "step");
 }
 
 void add_table1(const Results& r, std::vector<Criterion>& out) {
@@ -140,15 +134,15 @@ void add_table1(const Results& r, std::vector<Criterion>& out) {
               cell_ratios(r), "%.3f", in_fifth));
   out.push_back(decided("E1",
                         "microseconds a cell and step within 25 % of their middle, as in the paper",
-                        of_printed_bodies(r, per_cell<0>), "%.1f", constant));
-  out.push_back(decided("E1", "the same with Kerf's defaults", of_printed_bodies(r, per_cell<1>),
-                        "%.2f", constant));
+                        of_printed_bodies(r, per_cell, kPaperMethod), "%.1f", constant));
+  out.push_back(decided("E1", "the same with Kerf's defaults",
+                        of_printed_bodies(r, per_cell, kKerfMethod), "%.2f", constant));
   out.push_back(decided("E1",
                         "the octree is faster by more than 0.8 of the ratio of cells, as in the "
                         "paper (time ratio / cell ratio)",
-                        of_printed_bodies(r, gain<0>), "%.2f", pays));
-  out.push_back(
-      decided("E1", "the same with Kerf's defaults", of_printed_bodies(r, gain<1>), "%.2f", pays));
+                        of_printed_bodies(r, gain, kPaperMethod), "%.2f", pays));
+  out.push_back(decided("E1", "the same with Kerf's defaults",
+                        of_printed_bodies(r, gain, kKerfMethod), "%.2f", pays));
   Values sixth;
   for (const char* name : {"Bunny", "Cube", "Armadillo"}) sixth.add(name, cells_before(r, name));
   out.push_back(decided("E2", "1/6 of the cells before the cut, or less, on the larger bodies",
@@ -156,32 +150,26 @@ void add_table1(const Results& r, std::vector<Criterion>& out) {
   out.push_back(reported("E2",
                          "\"4 to 5 times as fast\" as the uniform grid, as in the paper; its own "
                          "table says 3.85; 2.25; 5.73; 2.25; 1.40",
-                         of_printed_bodies(r, faster<0>), "%.2f"));
-  out.push_back(
-      reported("E2", "the same with Kerf's defaults", of_printed_bodies(r, faster<1>), "%.2f"));
+                         of_printed_bodies(r, faster, kPaperMethod), "%.2f"));
+  out.push_back(reported("E2", "the same with Kerf's defaults",
+                         of_printed_bodies(r, faster, kKerfMethod), "%.2f"));
 }
 
 // ---- table 2
 
-template <int kMethod>
-double cg_error(const Results& r, const std::string& body) {
-  return r.ours("table2", body, kMethod == 0 ? kPaperMethod : kKerfMethod,
-                "error of CG in that time");
+double cg_error(const Results& r, const std::string& body, const char* method) {
+  return r.ours("table2", body, method, "error of CG in that time");
 }
 
 // Where CG was given up, how much longer it needs at least.
-template <int kMethod>
-double slower(const Results& r, const std::string& body) {
-  const char* method = kMethod == 0 ? kPaperMethod : kKerfMethod;
+double slower(const Results& r, const std::string& body, const char* method) {
   double cg = r.ours("table2", body, method, "CG to the same error");
   if (std::isnan(cg)) cg = r.ours("table2", body, method, "CG given up after");
   return cg / r.ours("table2", body, method, "multigrid");
 }
 
-template <int kMethod>
-double error3(const Results& r, const std::string& body) {
-  return r.ours("table2", body, kMethod == 0 ? kPaperMethod : kKerfMethod,
-                "error after three cycles");
+double error3(const Results& r, const std::string& body, const char* method) {
+  return r.ours("table2", body, method, "error after three cycles");
 }
 
 void add_table2(const Results& r, std::vector<Criterion>& out) {
@@ -190,18 +178,20 @@ void add_table2(const Results& r, std::vector<Criterion>& out) {
   const auto small = [](const Values& v) { return v.most() <= 0.11; };
   for (const bool paper : {true, false}) {
     const std::string who = paper ? ", as in the paper" : ", with Kerf's defaults";
-    const auto of = [&](const Of& a, const Of& b) { return of_printed_bodies(r, paper ? a : b); };
+    const auto of = [&](const Of& value) {
+      return of_printed_bodies(r, value, paper ? kPaperMethod : kKerfMethod);
+    };
     out.push_back(decided("E3", "CG with Jacobi leaves 0.6 or more in multigrid's time" + who,
-                          of(cg_error<0>, cg_error<1>), "%.3f", poor));
+                          of(cg_error), "%.3f", poor));
     out.push_back(decided("E3", "CG needs three times as long or longer for its error" + who,
-                          of(slower<0>, slower<1>), "%.1f", thrice));
+                          of(slower), "%.1f", thrice));
     out.push_back(decided("E3", "and the ratio grows with the body (Bunny 3, Bunny 2, Bunny)" + who,
-                          of(slower<0>, slower<1>), "%.1f", [](const Values& v) {
+                          of(slower), "%.1f", [](const Values& v) {
                             return v.at("Bunny 3") < v.at("Bunny 2") &&
                                    v.at("Bunny 2") < v.at("Bunny");
                           }));
-    out.push_back(decided("E4", "three cycles leave 0.11 or less" + who, of(error3<0>, error3<1>),
-                          "%.4f", small));
+    out.push_back(
+        decided("E4", "three cycles leave 0.11 or less" + who, of(error3), "%.4f", small));
   }
 }
 

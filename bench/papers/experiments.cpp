@@ -25,15 +25,20 @@ void run(Context& context, const Experiment& experiment) {
       if (figure.experiment == experiment.name) figure.printed = kNone;
 }
 
+SimulationSetup fitted(const Context& context, SimulationSetup setup) {
+  constexpr int kSmallCoarsest = 100;  // vertices
+  if (context.size == bench::Size::small) setup.solver.coarsest_vertices = kSmallCoarsest;
+  return setup;
+}
+
 std::optional<SimulationSetup> setup_of(Context& context, const BodyInfo& info, Grid grid) {
-  constexpr int kSmallCoarsest = 100;  // vertices, so that small bodies have levels too
   std::string missing;
   std::optional<SimulationSetup> out =
       make_setup(info, grid, context.size, context.folders, missing);
   if (!out)
     context.note(text(info.name, ": left out: ", missing,
                       " is in no folder of meshes (--meshes, KERF_MESHES)"));
-  if (out && context.size == bench::Size::small) out->solver.coarsest_vertices = kSmallCoarsest;
+  if (out) out = fitted(context, *std::move(out));
   return out;
 }
 

@@ -21,7 +21,7 @@ struct Context {
   int threads = 1;                             ///< where seconds count
   int all_threads = 1;                         ///< elsewhere
   int repeat = 3;
-  double give_up = 30;  ///< s: longest run of a slow solver
+  double give_up = 30;                            ///< s: longest run of a slow solver
   Results results;                                ///< they are added here
   std::function<void(const std::string&)> doing;  ///< told what runs now
   std::function<void(const std::string&)> note;   ///< told what was left out, and why
@@ -31,6 +31,8 @@ struct Experiment;
 /// Runs one, and blanks what is printed of the paper's bodies where ours are small.
 void run(Context& context, const Experiment& experiment);
 
+/// The same with coarse levels, if bodies are small.
+SimulationSetup fitted(const Context& context, SimulationSetup setup);
 /// The set-up of a body, prepared for `size`; empty, with a note, if its mesh is missing.
 std::optional<SimulationSetup> setup_of(Context& context, const BodyInfo& info, Grid grid);
 

@@ -5,81 +5,63 @@
 #include <utility>
 
 #include "app/backends.hpp"
+#include "bench/body.hpp"
 #include "bench/candidates.hpp"
 #include "bench/papers/results.hpp"
 #include "core/base/error.hpp"
 #include "core/base/timer.hpp"
 #include "core/body/cut.hpp"
-#include "core/body/voxelise.hpp"
 #include "core/surface/surface.hpp"
 
 namespace kerf::papers {
 namespace {
-
-LinkedOctree make_octree(const SimulationSetup& setup) {
-  const Lattice lattice =
-      make_lattice(setup.body.solid->bounds(), setup.body.resolution, setup.body.refinement);
-  std::vector<std::shared_ptr<const Solid>> regions;
-  for (const Region& region : setup.regions) regions.push_back(region.solid);
-  return LinkedOctree(voxelise(*setup.body.solid, lattice, regions), setup.body.refinement);
-}
 
 /// Ends a run at its limit.
 struct Enough {};
 
 constexpr double kDirectGoal = 1e-8;  // true relative residual; else it would refine in vain
 
-void follow(Backend& backend, Structure& structure, bool in_place) {
-  if (backend.can_update() && in_place) {
-    backend.update(structure.hierarchy(), structure.change());
-  } else {
-    structure.pack();
-    backend.load(structure.hierarchy());
-  }
-}
-
 }  // namespace
 
 Problem::Problem(SimulationSetup setup, Backend* follower, bool with_surface)
-    : setup_(std::move(setup)), octree_(make_octree(setup_)) {
-  structure_ = std::make_unique<Structure>(setup_, *octree_);
+    : setup_(std::move(setup)), octree_(bench::uncut_octree(setup_)), structure_(setup_, octree_) {
   cells_before_ = cells();
   vertices_before_ = vertices();
   std::optional<Surface> surface;
   if (with_surface) {
-    surface.emplace(*octree_, SurfaceMethod::dual_contouring);
-    surface->bind(*octree_);
+    surface.emplace(octree_, SurfaceMethod::dual_contouring);
+    surface->bind(octree_);
   }
   if (follower != nullptr) follower->load(hierarchy());
   std::int32_t id = 0;
   for (const CutSetup& blade : setup_.cuts)
     cut(blade, ++id, follower, surface ? &*surface : nullptr);
-  structure_->pack();
+  structure_.pack();
 }
 
 void Problem::cut(const CutSetup& blade, std::int32_t id, Backend* follower, Surface* surface) {
   CutEvent event;
   {
     const AddTime time(cut_times_.octree);
-    event = kerf::cut(*octree_, {}, blade.lines.empty() ? blade.mesh : sweep(blade.lines), id);
+    event = kerf::cut(octree_, {}, blade.lines.empty() ? blade.mesh : sweep(blade.lines), id);
   }
   if (surface != nullptr) {
     const AddTime time(cut_times_.surface);
-    surface->update(*octree_, event);
-    surface->bind(*octree_);
+    surface->update(octree_, event);
+    surface->bind(octree_);
   }
   if (!event.changed()) return;
   bool in_place = false;
   {
     const AddTime time(cut_times_.levels);
-    in_place = structure_->update(*octree_, event);
+    in_place = structure_.update(octree_, event);
   }
   if (follower == nullptr) return;
   const AddTime time(cut_times_.backend);
-  follow(*follower, *structure_, in_place);
+  bench::follow(*follower, structure_, in_place);
 }
 
-std::vector<double> Problem::load() const { return structure_->external().on_all(hierarchy()); }
+std::vector<double> Problem::load() const { return structure_.external().on_all(hierarchy()); }
 
 OperatorScale Problem::scale(double density) const {
   if (density == 0) return {};
@@ -153,8 +135,14 @@ double Machine::error_of(int x) {
 LinearSolver& Machine::solver_of(const SolverSetup& setup) {
   for (const std::unique_ptr<LinearSolver>& solver : solvers_) solver->release();
   solvers_.push_back(std::make_unique<LinearSolver>(*backend_, setup));
-  solvers_.back()->set_structure(problem_.hierarchy());
-  return *solvers_.back();
+  LinearSolver& out = *solvers_.back();
+  if (setup.method != SolverMethod::cholesky) {
+    // The bound of the smoother is estimated once after a cut, not in every step: in no time here.
+    out.set_structure(problem_.hierarchy());
+    out.refresh();
+  }
+  out.set_structure(problem_.hierarchy());  // so that it factors again
+  return out;
 }
 
 void Machine::find_solution(double goal) {
@@ -179,17 +167,6 @@ void Machine::take_solution(std::vector<double> solution) {
   norm_ = std::sqrt(norm_);
 }
 
-// The bound of the smoother is estimated once after a cut, not in every step: it is in no time.
-void Machine::make_values(bool with_coarse) {
-  const int levels = static_cast<int>(problem_.hierarchy().levels.size());
-  backend_->prepare(0);
-  for (int level = 0; with_coarse && level + 1 < levels; ++level) {
-    backend_->coarsen(level);
-    if (level + 2 < levels) backend_->prepare(level + 1);
-  }
-  backend_->wait();
-}
-
 Course Machine::run(const SolverSetup& setup, const Limits& limits) {
   constexpr double kNever = 1e-14;  // the limits end it
   const bool is_direct = setup.method == SolverMethod::cholesky;
@@ -198,7 +175,6 @@ Course Machine::run(const SolverSetup& setup, const Limits& limits) {
   SolverSetup endless = setup;
   endless.max_cycles = 100000;
   LinearSolver& solver = solver_of(endless);
-  if (!is_direct) make_values(is_multigrid);
   Course out;
   out.structure = solver.times().structure + (is_multigrid ? coarse_seconds_ : 0.0);
   const Timer values;
@@ -243,7 +219,6 @@ double Machine::step_seconds(const SolverSetup& setup, int repeat) {
   SolverSetup three = setup;
   three.cycles = kCycles;
   LinearSolver& solver = solver_of(three);
-  make_values(true);
   double best = kNone;
   for (int run = 0; run <= repeat; ++run) {
     reset();
@@ -270,8 +245,6 @@ SolverSetup paper_solver() {
     if (candidate.name == "paper") return candidate.solver;
   throw Error(ErrorKind::internal, "the bench has the solver of the paper");
 }
-
-SolverSetup multigrid_solver() { return method_solver(SolverMethod::multigrid); }
 
 SolverSetup default_solver() { return {}; }
 

@@ -37,12 +37,12 @@ class Problem {
   explicit Problem(SimulationSetup setup, Backend* follower = nullptr, bool with_surface = false);
 
   const SimulationSetup& setup() const { return setup_; }
-  const Hierarchy& hierarchy() const { return structure_->hierarchy(); }
-  const Lattice& lattice() const { return octree_->lattice(); }
+  const Hierarchy& hierarchy() const { return structure_.hierarchy(); }
+  const Lattice& lattice() const { return octree_.lattice(); }
   std::size_t cells_before() const { return cells_before_; }
   std::size_t vertices_before() const { return vertices_before_; }
-  std::size_t cells() const { return octree_->leaf_count(); }
-  std::size_t vertices() const { return structure_->finest().point.size(); }
+  std::size_t cells() const { return octree_.leaf_count(); }
+  std::size_t vertices() const { return structure_.finest().point.size(); }
   const CutTimes& cut_times() const { return cut_times_; }
   /// Of the scene, on the vertices, N.
   std::vector<double> load() const;
@@ -56,8 +56,8 @@ class Problem {
   void cut(const CutSetup& blade, std::int32_t id, Backend* follower, Surface* surface);
 
   SimulationSetup setup_;
-  std::optional<LinkedOctree> octree_;
-  std::unique_ptr<Structure> structure_;
+  LinkedOctree octree_;
+  Structure structure_;
   std::size_t cells_before_ = 0, vertices_before_ = 0;
   CutTimes cut_times_;
 };
@@ -118,7 +118,6 @@ class Machine {
   double error_of(int x);
   void reset();
   LinearSolver& solver_of(const SolverSetup& setup);
-  void make_values(bool with_coarse);
 
   const Problem& problem_;
   std::unique_ptr<Backend> backend_;
@@ -131,8 +130,6 @@ class Machine {
 
 /// V(1,1) alone, forward Gauss-Seidel with omega 1.7. Source  [DGW11] section 6.1.
 SolverSetup paper_solver();
-/// The cycle of a Kerf's default as a solver of its own, and as a preconditioner.
-SolverSetup multigrid_solver();
 SolverSetup default_solver();
 SolverSetup method_solver(SolverMethod method);
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 #include <utility>
 
@@ -201,11 +200,7 @@ Chart cost_chart(const Results& results) {
 }
 
 void write_report(const std::filesystem::path& folder, const Results& results) {
-  const std::filesystem::path file = folder / "papers.md";
-  std::ofstream stream(file);
-  stream << markdown(results);
-  stream.close();
-  expects(stream.good(), text("--out: ", file.string(), " cannot be written"));
+  bench::write_file(folder / "papers.md", markdown(results), "--out");
   const std::pair<const char*, Chart> charts[] = {{"figure10.svg", figure10_chart(results)},
                                                   {"figure12.svg", figure12_chart(results)},
                                                   {"cost.svg", cost_chart(results)}};

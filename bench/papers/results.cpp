@@ -2,12 +2,8 @@
 #include "bench/papers/results.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <fstream>
 #include <sstream>
 
-#include "bench/command_line.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf::papers {
@@ -15,58 +11,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFigureHead =
-    "experiment,body,method,quantity,unit,printed,ours,commit,build,machine";
-constexpr const char* kCurveHead = "experiment,panel,series,x,y,mark";
+using bench::csv_field;
 
-std::string field(double value) {
-  if (std::isnan(value)) return "";
-  std::ostringstream out;
-  out.precision(7);
-  out << value;
-  return out.str();
-}
-
-// Names of ours have no commas.
-std::string plain(const std::string& name) {
-  ensures(name.find_first_of(",\"\n") == std::string::npos, "a name without commas: " + name);
-  return name;
-}
-
-void write(const fs::path& file, const std::string& content) {
-  std::ofstream stream(file);
-  stream << content;
-  stream.close();
-  expects(stream.good(), text("--out: ", file.string(), " cannot be written"));
-}
-
-// Calls line(parts, where) for each line below the head.
-template <class Line>
-void read(const fs::path& file, const std::string& head, const Line& line) {
-  std::ifstream in(file);
-  expects(in.good(), text(file.string(), ": cannot be read"));
-  std::string raw;
-  std::getline(in, raw);
-  expects(raw == head, text(file.string(), ":1: the columns must be ", head));
-  const std::size_t columns = bench::split(head).size();
-  for (int number = 2; std::getline(in, raw); ++number) {
-    const std::string where = text(file.string(), ":", number);
-    const std::vector<std::string> parts = bench::split(raw);
-    expects(parts.size() == columns,
-            text(where, ": ", parts.size(), " fields instead of ", columns));
-    line(parts, where);
-  }
-}
-
-double number(const std::string& raw, const std::string& where, const char* column) {
-  if (raw.empty()) return kNone;
-  double out = 0;
-  const char* const end = raw.data() + raw.size();
-  const auto [stop, error] = std::from_chars(raw.data(), end, out);
-  expects(error == std::errc() && stop == end,
-          text(where, ": ", column, " is no number: '", raw, "'"));
-  return out;
-}
+constexpr int kDigits = 7;
 
 }  // namespace
 
@@ -95,32 +42,44 @@ Results without(Results results, const std::vector<std::string>& experiments) {
 }
 
 void write_results(const fs::path& folder, const Results& results, const bench::Origin& origin) {
-  const std::string here =
-      text(plain(origin.commit), ',', plain(origin.build), ',', plain(origin.machine));
   std::ostringstream figures, curves;
-  figures << kFigureHead << '\n';
-  for (const Figure& f : results.figures)
-    figures << plain(f.experiment) << ',' << plain(f.body) << ',' << plain(f.method) << ','
-            << plain(f.quantity) << ',' << plain(f.unit) << ',' << field(f.printed) << ','
-            << field(f.ours) << ',' << (f.origin.empty() ? here : f.origin) << '\n';
-  curves << kCurveHead << '\n';
+  figures << "experiment,body,method,quantity,unit,printed,ours,commit,build,machine\n";
+  for (const Figure& f : results.figures) {
+    const bench::Origin& of = f.origin.commit.empty() ? origin : f.origin;
+    figures << f.experiment << ',' << csv_field(f.body) << ',' << csv_field(f.method) << ','
+            << csv_field(f.quantity) << ',' << f.unit << ',' << csv_field(f.printed, kDigits) << ','
+            << csv_field(f.ours, kDigits) << ',' << of.commit << ',' << of.build << ','
+            << csv_field(of.machine) << '\n';
+  }
+  curves << "experiment,panel,series,x,y,mark\n";
   for (const Point& p : results.points)
-    curves << plain(p.experiment) << ',' << plain(p.panel) << ',' << plain(p.series) << ','
-           << field(p.x) << ',' << field(p.y) << ',' << (p.mark ? "1" : "") << '\n';
-  write(folder / kFiguresFile, figures.str());
-  write(folder / kCurvesFile, curves.str());
+    curves << p.experiment << ',' << csv_field(p.panel) << ',' << csv_field(p.series) << ','
+           << csv_field(p.x, kDigits) << ',' << csv_field(p.y, kDigits) << ','
+           << (p.mark ? "1" : "") << '\n';
+  bench::write_file(folder / kFiguresFile, figures.str(), "--out");
+  bench::write_file(folder / kCurvesFile, curves.str(), "--out");
 }
 
 Results read_results(const fs::path& folder) {
   Results out;
-  read(folder / kFiguresFile, kFigureHead, [&](const auto& p, const std::string& where) {
-    out.add({p[0], p[1], p[2], p[3], p[4], number(p[5], where, "printed"),
-             number(p[6], where, "ours"), text(p[7], ',', p[8], ',', p[9])});
-  });
-  read(folder / kCurvesFile, kCurveHead, [&](const auto& p, const std::string& where) {
-    out.points.push_back(
-        {p[0], p[1], p[2], number(p[3], where, "x"), number(p[4], where, "y"), !p[5].empty()});
-  });
+  bench::CsvReader figures(folder / kFiguresFile,
+                           {"experiment", "body", "method", "quantity", "printed", "ours"});
+  while (figures.next()) {
+    Figure f{figures.at("experiment"),
+             figures.at("body"),
+             figures.at("method"),
+             figures.at("quantity"),
+             figures.at("unit"),
+             figures.value("printed"),
+             figures.value("ours"),
+             {figures.at("commit"), figures.at("build"), figures.at("machine")}};
+    expects(!f.quantity.empty(), text(figures.where(), ": quantity is missing"));
+    out.add(std::move(f));
+  }
+  bench::CsvReader curves(folder / kCurvesFile, {"experiment", "panel", "series", "x", "y"});
+  while (curves.next())
+    out.points.push_back({curves.at("experiment"), curves.at("panel"), curves.at("series"),
+                          curves.value("x"), curves.value("y"), !curves.at("mark").empty()});
   return out;
 }
 

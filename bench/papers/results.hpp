@@ -19,9 +19,9 @@ struct Figure {
   std::string body;
   std::string method;  ///< empty: it does not depend on one
   std::string quantity, unit;
-  double printed = kNone;   ///< in the paper; no number: not there
-  double ours = kNone;      ///< no number: left out
-  std::string origin = "";  ///< the last columns of its line; empty: of this run
+  double printed = kNone;     ///< in the paper; no number: not there
+  double ours = kNone;        ///< no number: left out
+  bench::Origin origin = {};  ///< nothing in it: this run
 };
 
 struct Point {

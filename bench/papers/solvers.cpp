@@ -19,7 +19,7 @@ struct Contestant {
 
 std::vector<Contestant> contestants(const Problem& problem) {
   std::vector<Contestant> out{{"CG-Jacobi", method_solver(SolverMethod::cg_jacobi)},
-                              {"multigrid", multigrid_solver()},
+                              {"multigrid", method_solver(SolverMethod::multigrid)},
                               {"CG-multigrid", default_solver()}};
   if (problem.vertices() <= kMostForCholesky)
     out.push_back({"Cholesky", method_solver(SolverMethod::cholesky)});

@@ -52,7 +52,7 @@ void run_column(Context& context, const BodyInfo& info, const Column& column) {
   Machine machine(problem, std::move(backend), 1);
   machine.find_solution();
   const Values values = set_values(of_machine, static_cast<int>(problem.hierarchy().levels.size()));
-  SolverSetup solver = multigrid_solver();
+  SolverSetup solver = method_solver(SolverMethod::multigrid);
   solver.cycle = CycleType::v;
   solver.pre_sweeps = solver.post_sweeps = kSweeps;
   const Course course = machine.run(solver, {kCycles, 0, 0});

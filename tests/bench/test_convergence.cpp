@@ -247,7 +247,7 @@ TEST(ConvergenceOptions, NamesAndValuesAreChecked) {
   EXPECT_EQ(refusal({"--table", "cubes"}), "--table: no table 'cubes'; did you mean 'cube'?");
   EXPECT_EQ(refusal({"--tabel", "cube"}), "no option '--tabel'; did you mean '--table'?");
   EXPECT_EQ(refusal({"--table", "cube", "--size", "tiny"}),
-            "--size must be full or small, not 'tiny'");
+            "--size: no size 'tiny'; there are: full, small");
   EXPECT_EQ(refusal({"--plot", "a.csv"}), "--plot FILE.csv and --svg FILE.svg go together");
   EXPECT_EQ(refusal({"--table", "all"}), "");
   EXPECT_NE(refusal({"--table", "all", "--markdown", "a.csv"}), "");
