@@ -317,7 +317,7 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   const PatchedLevel& to = levels_[fine + 1].patched;
   const Level& coarse = *to.level;
   const std::int32_t* cells = to.cell.data() + kGroup * group + first;
-  for (P& entry : out) entry = P{};
+  for (P& entry : out) entry = P(0);
   for (std::size_t n = 0;; ++n) {
     std::int32_t child[P::kLanes];
     bool any = false;

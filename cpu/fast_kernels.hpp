@@ -181,45 +181,57 @@ void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, st
 }
 
 /// Rotations of a group from the displacements, warm-started. Where Newton proves nothing within
-/// its steps, a lane goes the way of the reference.
+/// its steps, a lane goes the way of the reference. The packs of a group take their steps in turn,
+/// since each operation of a step waits for the one before.
 template <class S>
 void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_t group,
                   const S* x) {
   using P = Pack<S>;
-  constexpr int kIterations = 8;
+  constexpr int kIterations = 8, kPacks = kGroup / P::kLanes;
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
   const P side = P(level.kinds[level.kind[group]].side);
+  kernels::Mat3<P> F[kPacks];
+  kernels::Quat<P> start[kPacks], q[kPacks];
+  PackMask<S> proven[kPacks], lost[kPacks];
   for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
+    const int n = first / P::kLanes;
     kernels::Vec3<P> corners[8];
     gather_corners<row()>(points, x, corners);
-    const auto F = kernels::mean_gradient(corners, side);
-    const auto start = values.quaternion(group, first);
-    auto q = kernels::normalised(start);
-    PackMask<S> proven = {P(S(1)).v < P(S(0)).v}, lost = proven;
-    for (int i = 0; i < kIterations; ++i) {
-      const auto step = kernels::rotation_step(F, q);
-      lost = lost || !(step.ascent || proven);
-      q = {select(proven, q.w, step.next.w), select(proven, q.x, step.next.x),
-           select(proven, q.y, step.next.y), select(proven, q.z, step.next.z)};
-      proven = proven || (step.ascent && step.length2 <= small2);
-      if (all(proven || lost)) break;
-    }
-    const PackMask<S> done = proven && !lost;
-    if (!all(done))
-      for (int k = 0; k < P::kLanes; ++k) {
-        if (done.v[k] != 0) continue;
-        kernels::Mat3<S> f;
-        for (int a = 0; a < 3; ++a)
-          for (int b = 0; b < 3; ++b) f[a][b] = F[a][b][k];
-        const auto turned = kernels::extract_rotation(
-            f, kernels::Quat<S>{start.w[k], start.x[k], start.y[k], start.z[k]});
-        q.w.set(k, turned.w);
-        q.x.set(k, turned.x);
-        q.y.set(k, turned.y);
-        q.z.set(k, turned.z);
-      }
-    values.set_quaternion(group, first, q);
+    F[n] = kernels::mean_gradient(corners, side);
+    start[n] = values.quaternion(group, first);
+    q[n] = kernels::normalised(start[n]);
+    proven[n] = lost[n] = {P(S(1)).v < P(S(0)).v};
   });
+  for (int i = 0; i < kIterations; ++i) {
+    bool done = true;
+    for (int n = 0; n < kPacks; ++n) {
+      kernels::RotationStep<P> step;
+      kernels::rotation_step(F[n], q[n], step);
+      lost[n] = lost[n] || !(step.ascent || proven[n]);
+      q[n] = {select(proven[n], q[n].w, step.next.w), select(proven[n], q[n].x, step.next.x),
+              select(proven[n], q[n].y, step.next.y), select(proven[n], q[n].z, step.next.z)};
+      proven[n] = proven[n] || (step.ascent && step.length2 <= small2);
+      done = done && all(proven[n] || lost[n]);
+    }
+    if (done) break;
+  }
+  for (int n = 0; n < kPacks; ++n) {
+    const PackMask<S> done = proven[n] && !lost[n];
+    for (int k = 0; k < P::kLanes && !all(done); ++k) {
+      if (done.v[k] != 0) continue;
+      kernels::Mat3<S> f;
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) f[a][b] = F[n][a][b][k];
+      const kernels::Quat<P>& from = start[n];
+      const auto turned = kernels::extract_rotation(
+          f, kernels::Quat<S>{from.w[k], from.x[k], from.y[k], from.z[k]});
+      q[n].w.set(k, turned.w);
+      q[n].x.set(k, turned.x);
+      q[n].y.set(k, turned.y);
+      q[n].z.set(k, turned.z);
+    }
+    values.set_quaternion(group, n * P::kLanes, q[n]);
+  }
 }
 
 /// w[i][m]: the value at point i of a child from those at the corners m of its parent.
@@ -372,7 +384,8 @@ void corner_matrices(const PatchedLevel& level, const FinestValues<S>& values,
 /// Brings matrices of some cells from corners to slots.
 template <class P>
 void fold_matrices(const PatchedLevel& level, const std::int32_t* cells, P (&full)[24][24]) {
-  P sum[kEntries] = {};
+  P sum[kEntries];
+  std::fill(sum, sum + kEntries, P(0));
   add_product(full, fold_columns<P>(level, cells), sum);
   kernels::expand_packed(static_cast<const P*>(sum), full);
 }
@@ -450,7 +463,7 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
   using P = Pack<S>;
   const std::uint64_t materials = materials_of<S>(level, children);
   if (materials == 0)  // all children are wholly held
-    for (P& entry : out) entry = P{};
+    for (P& entry : out) entry = P(0);
   bool first = true;
   for (std::size_t m = 0; m < values.materials.size(); ++m) {
     if (((materials >> (m % 64)) & 1) == 0) continue;

@@ -269,7 +269,7 @@ class FrontFactor {
   void backward(const Front& front, double* x) const {
     for (int j = front.padded_columns() - 4; j >= 0; j -= 4) {
       const Columns columns = columns_at(front, j);
-      P sum[4] = {P{}, P{}, P{}, P{}};
+      P sum[4] = {P(0), P(0), P(0), P(0)};
       for (int i = j + 4; i < front.height(); i += 4) {
         const P at = load_pack(x + i);
         P entries;

@@ -37,9 +37,9 @@ struct Pack {
   using Scalar = S;
   static constexpr int kLanes = kPackBytes / static_cast<int>(sizeof(S));
   typedef S Vector __attribute__((vector_size(kPackBytes)));
-  Vector v;  // Pack{} is zero; an array of packs without braces is not
+  Vector v;
 
-  Pack() = default;
+  Pack() {}  // not zero, for members of Vec3 and Mat3 would be cleared before they are written
   Pack(const Vector& vector) : v(vector) {}  // NOLINT: packs and vectors are one thing
   template <class Number>
   requires std::is_arithmetic_v<Number>
@@ -77,9 +77,13 @@ Pack<S> select(const PackMask<S>& mask, const Pack<S>& a, const Pack<S>& b) {
 
 template <class S>
 bool all(const PackMask<S>& mask) {
+#if defined(__AVX2__) && defined(__FMA__)
+  return _mm256_movemask_epi8(__m256i(mask.v)) == -1;
+#else
   for (int i = 0; i < Pack<S>::kLanes; ++i)
     if (mask.v[i] == 0) return false;
   return true;
+#endif
 }
 
 inline Pack<float> fma(const Pack<float>& a, const Pack<float>& b, const Pack<float>& c) {

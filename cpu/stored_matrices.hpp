@@ -158,7 +158,7 @@ class StoredMatrices {
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     int count = 0;
     if constexpr (std::is_same_v<S, float>) count = gather_codes(lanes, out);
-    std::fill(out + count, out + kernels::kEntries, P{});
+    std::fill(out + count, out + kernels::kEntries, P(0));
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const auto lane = static_cast<std::size_t>(lanes[k]);
@@ -207,7 +207,7 @@ class StoredMatrices {
   }
 
   void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
-    P greatest{};
+    P greatest = P(0);
     for (int e = 0; e < count; ++e) {
       greatest = select(greatest < entries[e], entries[e], greatest);
       greatest = select(greatest < -entries[e], -entries[e], greatest);

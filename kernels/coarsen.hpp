@@ -60,7 +60,7 @@ KERF_HD void gather_strip(const T (&full)[kUnknowns][kUnknowns], const WeightCol
 template <class T>
 KERF_HD Mat3<T> gather_block(const T (&strip)[3][kUnknowns], const WeightColumns<T>& columns,
                              int m) {
-  Mat3<T> block;
+  Mat3<T> block{{{T(0), T(0), T(0)}, {T(0), T(0), T(0)}, {T(0), T(0), T(0)}}};
   for (int k = 0; k < columns.count[m]; ++k) {
     const int first = 3 * columns.child[m][k];
     for (int a = 0; a < 3; ++a)

@@ -13,6 +13,10 @@ template <class T>
 struct Vec3 {
   T x{}, y{}, z{};
 
+  // Written out, since GCC 12 clears an array of an aggregate whose scalars do nothing themselves.
+  KERF_HD constexpr Vec3() {}
+  KERF_HD constexpr Vec3(const T& a, const T& b, const T& c) : x(a), y(b), z(c) {}
+
   KERF_HD T& operator[](int i) { return i == 0 ? x : (i == 1 ? y : z); }
   KERF_HD const T& operator[](int i) const { return i == 0 ? x : (i == 1 ? y : z); }
 
@@ -67,9 +71,7 @@ struct Mat3 {
   KERF_HD const T* operator[](int row) const { return m[row]; }
 
   KERF_HD static Mat3 identity() {
-    Mat3 a;
-    a.m[0][0] = a.m[1][1] = a.m[2][2] = T(1);
-    return a;
+    return {{{T(1), T(0), T(0)}, {T(0), T(1), T(0)}, {T(0), T(0), T(1)}}};
   }
   KERF_HD Mat3& operator+=(const Mat3& b) {
     for (int i = 0; i < 3; ++i)
@@ -243,7 +245,7 @@ KERF_HD Vec3<T> solve3(const Mat3<T>& A, const Vec3<T>& b) {
 /// w + x i + y j + z k; a rotation when of length one. q and -q are the same rotation.
 template <class T>
 struct Quat {
-  T w{T(1)}, x{}, y{}, z{};
+  T w{T(1)}, x{T(0)}, y{T(0)}, z{T(0)};
 
   friend KERF_HD bool operator==(const Quat& a, const Quat& b) {
     return a.w == b.w && a.x == b.x && a.y == b.y && a.z == b.z;

@@ -40,30 +40,6 @@ KERF_HD constexpr int mode_entry(int s, int i, int t, int k) {
   return a >= b ? packed_index(a, b) : packed_index(b, a);
 }
 
-// Loops whose counter is a constant: indices into a packed triangle are then none at run time.
-template <int n>
-struct Constant {
-  static constexpr int value = n;
-};
-template <int... n>
-struct Counters {};
-template <int count, int... n>
-struct CountersBelow : CountersBelow<count - 1, count - 1, n...> {};
-template <int... n>
-struct CountersBelow<0, n...> {
-  using List = Counters<n...>;
-};
-template <class F, int... n>
-KERF_HD void unrolled(Counters<n...>, const F& f) {
-  (f(Constant<n>{}), ...);
-}
-
-/// f(Constant<0>) to f(Constant<count - 1>).
-template <int count, class F>
-KERF_HD void unrolled(const F& f) {
-  unrolled(typename CountersBelow<count>::List{}, f);
-}
-
 // ---- one finest cell -----------------------------------------------------------------------
 
 /// What C of one finest cell is made of. Arrays, since those are not set to zero first.
@@ -173,28 +149,9 @@ KERF_HD void finest_diagonal_blocks(const Mat3<T>& R, T stiffness, T mass,
 
 // ---- a parent of eight finest cells --------------------------------------------------------
 
-/// One axis of a Walsh transform, of the v[i] with i without the bits `skipped`.
-template <int bit, int skipped, class T>
-KERF_HD void walsh_axis(T (&v)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) {
-    if ((i & (bit | skipped)) != 0) continue;
-    const T low = v[i], high = v[i + bit];
-    v[i] = high + low;
-    v[i + bit] = high - low;
-  }
-}
-
-/// v[p] = sum over the octants of chi_p(octant) v[octant]: to_modes for one component.
-template <class T>
-KERF_HD void walsh_transform(T (&v)[kCorners]) {
-  walsh_axis<1, 0>(v);
-  walsh_axis<2, 0>(v);
-  walsh_axis<4, 0>(v);
-}
-
-/// The same for the p without an axis alone: half the work.
+/// to_modes for the modes without an axis alone: half the work.
 template <int axis, class T>
-KERF_HD void walsh_transform_across(T (&v)[kCorners]) {
+KERF_HD void modes_across(T (&v)[kCorners]) {
   constexpr int bit = 1 << axis, next = axis == 0 ? 2 : 1, last = axis == 2 ? 2 : 4;
   for (int i = 0; i < kCorners; ++i)
     if ((i & bit) == 0) v[i] += v[i + bit];
@@ -238,9 +195,9 @@ KERF_HD void coarsen_component(const TurnedCell<T> (&cells)[kCorners], T ratio, 
   unrolled<9>([&](auto pair) {
     constexpr int a = decltype(pair)::value / 3, b = decltype(pair)::value % 3;
     if constexpr (a == b)
-      walsh_transform_across<a>(w[a][b]);
+      modes_across<a>(w[a][b]);
     else if constexpr (i != k || a < b)
-      walsh_transform(w[a][b]);
+      to_modes(w[a][b]);
   });
   unrolled<64>([&](auto pair) {
     constexpr int s = decltype(pair)::value / 8, t = decltype(pair)::value % 8;
@@ -264,7 +221,7 @@ KERF_HD void add_finest_mass(const FinestChild<T> (&children)[kCorners], const T
                              Out out) {
   T moment[kCorners];
   for (int o = 0; o < kCorners; ++o) moment[o] = children[o].mass;
-  walsh_transform(moment);
+  to_modes(moment);
   const T shared[4] = {mass[0], mass[0] + mass[1], mass[0] + T(2) * mass[1] + mass[2],
                        mass[0] + T(3) * (mass[1] + mass[2]) + mass[3]};
   for (int e = kModeEntries; e < kEntries; ++e) out[e] = T(0);
@@ -438,68 +395,44 @@ KERF_HD void coarsen_modes(const Children& child, unsigned present, Out out) {
 
 // ---- use -----------------------------------------------------------------------------------
 
-/// One axis of corner_transform.
-template <int bit, class T>
-KERF_HD void corner_axis(T (&v)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) {
-    if ((i & bit) != 0) continue;
-    const T even = v[i], odd = v[i + bit];
-    v[i] = even - odd;
-    v[i + bit] = even + odd;
-  }
-}
-
-/// v[i] = sum over p of chi_p(i) v[p]: to_corners for one component.
-template <class T>
-KERF_HD void corner_transform(T (&v)[kCorners]) {
-  corner_axis<1>(v);
-  corner_axis<2>(v);
-  corner_axis<4>(v);
-}
-
-/// Block (s, t) of a symmetric product: out[s] += B in[t], and out[t] += B^T in[s] unless s = t.
-template <int s, int t, class T, class Matrix>
-KERF_HD void apply_block(const Matrix& A, const T (&in)[3][kCorners], T (&out)[3][kCorners]) {
-  T along[3], across[3];
-  for (int i = 0; i < 3; ++i) {
-    along[i] = out[i][s];
-    across[i] = s == t ? T(0) : out[i][t];
-  }
+/// Row s of a symmetric product: out[s] = A_st in[t] summed over t >= s, and out[t] += A_st^T in[s]
+/// of t > s.
+template <int s, class T, class Matrix>
+KERF_HD void apply_mode_row(const Matrix& A, const T (&in)[3][kCorners], T (&out)[3][kCorners]) {
+  const T own[3] = {in[0][s], in[1][s], in[2][s]};
+  T sum[3];
+  unrolled<7 - s>([&](auto col) {
+    constexpr int t = 7 - decltype(col)::value;
+    const T other[3] = {in[0][t], in[1][t], in[2][t]};
+    T across[3] = {out[0][t], out[1][t], out[2][t]};
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        const T a = A[mode_entry(s, i, t, k)];
+        sum[i] = t == 7 && k == 0 ? a * other[0] : fma(a, other[k], sum[i]);
+        across[k] = fma(a, own[i], across[k]);
+      }
+    for (int k = 0; k < 3; ++k) out[k][t] = across[k];
+  });
   for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < (s == t ? i + 1 : 3); ++k) {
-      const T a = A[mode_entry(s, i, t, k)];
-      along[i] = fma(a, in[k][t], along[i]);
-      if (s != t || k < i) across[k] = fma(a, in[i][s], across[k]);
+    for (int k = 0; k <= i; ++k) {
+      const T a = A[mode_entry(s, i, s, k)];
+      sum[i] = s == 7 && k == 0 ? a * own[0] : fma(a, own[k], sum[i]);
+      if (k < i) sum[k] = fma(a, own[i], sum[k]);
     }
-  for (int i = 0; i < 3; ++i) {
-    out[i][s] = s == t ? along[i] + across[i] : along[i];
-    if (s != t) out[i][t] = across[i];
-  }
+  for (int i = 0; i < 3; ++i) out[i][s] = sum[i];
 }
 
 /// f = A u by corners, each entry read once; f may be u.
 template <bool with_translations, class T, class Matrix>
 KERF_HD void apply_mode_matrix(const Matrix& A, const Vec3<T> (&u)[kCorners],
                                Vec3<T> (&f)[kCorners]) {
-  constexpr int modes = with_translations ? 8 : 7;
   T in[3][kCorners], out[3][kCorners];
-  for (int i = 0; i < kCorners; ++i) {
-    in[0][i] = u[i].x;
-    in[1][i] = u[i].y;
-    in[2][i] = u[i].z;
-  }
-  for (int i = 0; i < 3; ++i) {
-    walsh_transform(in[i]);
-    for (int s = 0; s < kCorners; ++s) out[i][s] = T(0);
-  }
+  to_modes(u, in);
   // As the entries lie.
-  unrolled<modes>([&](auto row) {
-    constexpr int s = 7 - decltype(row)::value;
-    unrolled<decltype(row)::value + 1>(
-        [&](auto col) { apply_block<s, 7 - decltype(col)::value>(A, in, out); });
-  });
-  for (int i = 0; i < 3; ++i) corner_transform(out[i]);
-  for (int i = 0; i < kCorners; ++i) f[i] = {out[0][i], out[1][i], out[2][i]};
+  unrolled<with_translations ? 8 : 7>(
+      [&](auto row) { apply_mode_row<7 - decltype(row)::value>(A, in, out); });
+  if constexpr (!with_translations) out[0][0] = out[1][0] = out[2][0] = T(0);
+  to_corners(out, f);
 }
 
 /// The diagonal 3x3 blocks by corners, H^T S H, of all eight: chi_s chi_t = chi_(s xor t), so that
@@ -524,7 +457,7 @@ KERF_HD void mode_diagonal_blocks(const Matrix& A, Sym3<T> (&D)[kCorners]) {
         }
         sums[p] = sum;
       });
-      corner_transform(sums);
+      to_corners(sums);
     }
   });
   for (int n = 0; n < kCorners; ++n)
@@ -535,13 +468,15 @@ KERF_HD void mode_diagonal_blocks(const Matrix& A, Sym3<T> (&D)[kCorners]) {
 /// One of two halves of the congruence with H or H^T: the 24 rows or columns as eight vectors.
 template <bool corners, class T>
 KERF_HD void convert_row(T (&row)[kUnknowns]) {
-  Vec3<T> v[kCorners];
-  for (int i = 0; i < kUnknowns; ++i) v[corners ? 7 - i / 3 : i / 3][i % 3] = row[i];
-  if constexpr (corners)
-    to_corners(v);
-  else
-    to_modes(v);
-  for (int i = 0; i < kUnknowns; ++i) row[i] = v[corners ? i / 3 : 7 - i / 3][i % 3];
+  for (int component = 0; component < 3; ++component) {
+    T v[kCorners];
+    for (int i = 0; i < kCorners; ++i) v[i] = row[3 * (corners ? 7 - i : i) + component];
+    if constexpr (corners)
+      to_corners(v);
+    else
+      to_modes(v);
+    for (int i = 0; i < kCorners; ++i) row[3 * (corners ? i : 7 - i) + component] = v[i];
+  }
 }
 
 template <bool corners, class T, class Matrix, class Out>

@@ -17,6 +17,7 @@
 
 #include "kernels/hex_element.hpp"
 #include "kernels/mat3.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::kernels {
 
@@ -70,96 +71,176 @@ KERF_HD constexpr int mode_axes(int mode) {
   return (mode & 1) + ((mode >> 1) & 1) + ((mode >> 2) & 1);
 }
 
-/// H: corners to modes, in place. 24 additions a component.
-template <class T>
-KERF_HD void to_modes(Vec3<T> (&v)[kCorners]) {
-  for (int bit = 1; bit < kCorners; bit *= 2)
-    for (int i = 0; i < kCorners; ++i) {
-      if ((i & bit) != 0) continue;
-      const Vec3<T> low = v[i], high = v[i + bit];
-      v[i] = high + low;
-      v[i + bit] = high - low;
-    }
+/// One axis of H, of the v[i] with i without the bits `skipped`.
+template <int bit, int skipped, class T>
+KERF_HD void walsh_axis(T (&v)[kCorners]) {
+  for (int i = 0; i < kCorners; ++i) {
+    if ((i & (bit | skipped)) != 0) continue;
+    const T low = v[i], high = v[i + bit];
+    v[i] = high + low;
+    v[i + bit] = high - low;
+  }
+}
+/// One axis of H^T.
+template <int bit, class T>
+KERF_HD void corner_axis(T (&v)[kCorners]) {
+  for (int i = 0; i < kCorners; ++i) {
+    if ((i & bit) != 0) continue;
+    const T even = v[i], odd = v[i + bit];
+    v[i] = even - odd;
+    v[i + bit] = even + odd;
+  }
 }
 
+/// H: corners to modes, of one component, in place. 24 additions.
+template <class T>
+KERF_HD void to_modes(T (&v)[kCorners]) {
+  walsh_axis<1, 0>(v);
+  walsh_axis<2, 0>(v);
+  walsh_axis<4, 0>(v);
+}
 /// H^T: modes to corners, in place. The inverse of to_modes times 8.
 template <class T>
-KERF_HD void to_corners(Vec3<T> (&v)[kCorners]) {
-  for (int bit = 1; bit < kCorners; bit *= 2)
-    for (int i = 0; i < kCorners; ++i) {
-      if ((i & bit) != 0) continue;
-      const Vec3<T> even = v[i], odd = v[i + bit];
-      v[i] = even - odd;
-      v[i + bit] = even + odd;
-    }
+KERF_HD void to_corners(T (&v)[kCorners]) {
+  corner_axis<1>(v);
+  corner_axis<2>(v);
+  corner_axis<4>(v);
 }
 
-/// S m, in place. 35 floating-point slots.
+/// The same for vectors, m[component][mode], one component after the other: eight packs fit into
+/// registers, and 24 do not.
 template <class T>
-KERF_HD void apply_modes(const ModeStiffness<T>& k, Vec3<T> (&m)[kCorners]) {
-  m[0] = {};
-
-  const T volume = k.b * (m[1].x + m[2].y + m[4].z);
-  const T deviator = k.a - k.b;
-  m[1].x = fma(deviator, m[1].x, volume);
-  m[2].y = fma(deviator, m[2].y, volume);
-  m[4].z = fma(deviator, m[4].z, volume);
-
-  const Vec3<T> xy = m[3], xz = m[5], yz = m[6];
-  m[3].y = fma(k.c, xy.y, k.d * xz.z);
-  m[5].z = fma(k.c, xz.z, k.d * xy.y);
-  m[3].x = fma(k.c, xy.x, k.d * yz.z);
-  m[6].z = fma(k.c, yz.z, k.d * xy.x);
-  m[5].x = fma(k.c, xz.x, k.d * yz.y);
-  m[6].y = fma(k.c, yz.y, k.d * xz.x);
-
-  m[2].x = m[1].y = k.e * (m[2].x + m[1].y);
-  m[4].x = m[1].z = k.e * (m[4].x + m[1].z);
-  m[4].y = m[2].z = k.e * (m[4].y + m[2].z);
-  m[7] *= k.f;
-
-  const T twist = yz.x + xz.y + xy.z;
-  m[6].x = k.g * (yz.x + twist);
-  m[5].y = k.g * (xz.y + twist);
-  m[3].z = k.g * (xy.z + twist);
+KERF_HD void to_modes(const Vec3<T> (&v)[kCorners], T (&m)[3][kCorners]) {
+  for (int i = 0; i < kCorners; ++i) m[0][i] = v[i].x;
+  to_modes(m[0]);
+  for (int i = 0; i < kCorners; ++i) m[1][i] = v[i].y;
+  to_modes(m[1]);
+  for (int i = 0; i < kCorners; ++i) m[2][i] = v[i].z;
+  to_modes(m[2]);
+}
+template <class T>
+KERF_HD void to_corners(T (&m)[3][kCorners], Vec3<T> (&v)[kCorners]) {
+  to_corners(m[0]);
+  for (int i = 0; i < kCorners; ++i) v[i].x = m[0][i];
+  to_corners(m[1]);
+  for (int i = 0; i < kCorners; ++i) v[i].y = m[1][i];
+  to_corners(m[2]);
+  for (int i = 0; i < kCorners; ++i) v[i].z = m[2][i];
 }
 
-/// f = stiffness [R] K [R]^T u for one finest cell without inertia; f may be u. 318 slots.
+/// Three modes in the frame of a cell: l[n] = R^T m. By rows of R, so that only l and a row need
+/// registers.
+template <int first, int second, int third, class T>
+KERF_HD void modes_into_frame(const Mat3<T>& R, const T (&m)[3][kCorners], T (&l)[3][3]) {
+  constexpr int modes[] = {first, second, third};
+  unrolled<3>([&](auto row) {
+    constexpr int i = 2 - decltype(row)::value;
+    const T r0 = R[i][0], r1 = R[i][1], r2 = R[i][2];
+    unrolled<3>([&](auto mode) {
+      constexpr int n = decltype(mode)::value;
+      const T g = m[i][modes[n]];
+      l[n][0] = i == 2 ? r0 * g : fma(r0, g, l[n][0]);
+      l[n][1] = i == 2 ? r1 * g : fma(r1, g, l[n][1]);
+      l[n][2] = i == 2 ? r2 * g : fma(r2, g, l[n][2]);
+    });
+  });
+}
+/// And back: m = R l, or R l + inertia m.
+template <int first, int second, int third, bool with_inertia, class T>
+KERF_HD void modes_from_frame(const Mat3<T>& R, const T (&l)[3][3], T inertia,
+                              T (&m)[3][kCorners]) {
+  constexpr int modes[] = {first, second, third};
+  unrolled<3>([&](auto row) {
+    constexpr int i = decltype(row)::value;
+    const T r0 = R[i][0], r1 = R[i][1], r2 = R[i][2];
+    unrolled<3>([&](auto mode) {
+      constexpr int n = decltype(mode)::value;
+      T& out = m[i][modes[n]];
+      const T last = with_inertia ? fma(r2, l[n][2], inertia * out) : r2 * l[n][2];
+      out = fma(r0, l[n][0], fma(r1, l[n][1], last));
+    });
+  });
+}
+
+/// S of the modes x, y and z of a cell, l[mode][component], in place.
+template <class T>
+KERF_HD void apply_linear_modes(const ModeStiffness<T>& k, T (&l)[3][3]) {
+  const T volume = k.b * (l[0][0] + l[1][1] + l[2][2]);
+  const T deviator = k.a - k.b;
+  l[0][0] = fma(deviator, l[0][0], volume);
+  l[1][1] = fma(deviator, l[1][1], volume);
+  l[2][2] = fma(deviator, l[2][2], volume);
+  l[1][0] = l[0][1] = k.e * (l[1][0] + l[0][1]);
+  l[2][0] = l[0][2] = k.e * (l[2][0] + l[0][2]);
+  l[2][1] = l[1][2] = k.e * (l[2][1] + l[1][2]);
+}
+
+/// S of the modes xy, xz and yz.
+template <class T>
+KERF_HD void apply_bilinear_modes(const ModeStiffness<T>& k, T (&l)[3][3]) {
+  const auto couple = [&](T& p, T& q) {
+    const T was = p;
+    p = fma(k.c, was, k.d * q);
+    q = fma(k.c, q, k.d * was);
+  };
+  couple(l[0][1], l[1][2]);
+  couple(l[0][0], l[2][2]);
+  couple(l[1][0], l[2][1]);
+  const T twist = l[2][0] + l[1][1] + l[0][2];
+  l[2][0] = k.g * (l[2][0] + twist);
+  l[1][1] = k.g * (l[1][1] + twist);
+  l[0][2] = k.g * (l[0][2] + twist);
+}
+
+/// m = stiffness [R] S [R]^T m, or that + inertia m, in place; inertia of a mode with 0, 1, 2, 3
+/// axes. add_rest(l) adds to the linear modes in the frame of the cell.
+template <bool with_inertia, class T, class Rest>
+KERF_HD void apply_modes(const Mat3<T>& R, T stiffness, const ModeStiffness<T>& unit,
+                         const T (&inertia)[4], const Rest& add_rest, T (&m)[3][kCorners]) {
+  const ModeStiffness<T> k{stiffness * unit.a, stiffness * unit.b, stiffness * unit.c,
+                           stiffness * unit.d, stiffness * unit.e, stiffness * unit.f,
+                           stiffness * unit.g};
+  for (int i = 0; i < 3; ++i) m[i][0] = with_inertia ? inertia[0] * m[i][0] : T(0);
+  T linear[3][3];
+  modes_into_frame<1, 2, 4>(R, m, linear);
+  add_rest(linear);
+  apply_linear_modes(k, linear);
+  modes_from_frame<1, 2, 4, with_inertia>(R, linear, inertia[1], m);
+  T bilinear[3][3];
+  modes_into_frame<3, 5, 6>(R, m, bilinear);
+  apply_bilinear_modes(k, bilinear);
+  modes_from_frame<3, 5, 6, with_inertia>(R, bilinear, inertia[2], m);
+  // Mode xyz is a multiple of its own, and R R^T = 1.
+  const T all = with_inertia ? k.f + inertia[3] : k.f;
+  for (int i = 0; i < 3; ++i) m[i][7] *= all;
+}
+
+/// f = stiffness [R] K [R]^T u for one finest cell without inertia; f may be u. 300 slots.
 ///
 /// Shapes  u, f: 8 corners; R: proper rotation from the reference to the deformed cell.
 /// Source  [DGW11], section 5.
 template <class T>
 KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffness,
                         const ModeStiffness<T>& k, Vec3<T> (&f)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) f[i] = u[i];
-  to_modes(f);
-  for (int s = 1; s < kCorners; ++s) f[s] = transpose_times(R, f[s]);
-  apply_modes(k, f);
-  const Mat3<T> scaled = stiffness * R;
-  for (int s = 1; s < kCorners; ++s) f[s] = scaled * f[s];
-  to_corners(f);
+  T m[3][kCorners];
+  to_modes(u, m);
+  const T inertia[4] = {T(0), T(0), T(0), T(0)};
+  apply_modes<false>(
+      R, stiffness, k, inertia, [](const auto&) {}, m);
+  to_corners(m, f);
 }
 
 /// f = (stiffness [R] K [R]^T + mass M (x) I) u; f may be u.
 template <class T>
 KERF_HD void apply_cell(const Vec3<T> (&u)[kCorners], const Mat3<T>& R, T stiffness, T mass,
                         const ModeConstants<T>& constants, Vec3<T> (&f)[kCorners]) {
-  Vec3<T> modes[kCorners], local[kCorners];
-  for (int i = 0; i < kCorners; ++i) modes[i] = u[i];
-  to_modes(modes);
-  for (int s = 1; s < kCorners; ++s) local[s] = transpose_times(R, modes[s]);
-  apply_modes(constants.stiffness, local);
-  const Mat3<T> scaled = stiffness * R;
-  T inertia[4];
-  for (int axes = 0; axes < 4; ++axes) inertia[axes] = mass * constants.mass[axes];
-  f[0] = inertia[0] * modes[0];
-  for (int s = 1; s < kCorners; ++s) {
-    const T m = inertia[mode_axes(s)];
-    const Vec3<T> elastic = scaled * local[s];
-    f[s] = {fma(m, modes[s].x, elastic.x), fma(m, modes[s].y, elastic.y),
-            fma(m, modes[s].z, elastic.z)};
-  }
-  to_corners(f);
+  T m[3][kCorners];
+  to_modes(u, m);
+  const T(&unit)[4] = constants.mass;
+  const T inertia[4] = {mass * unit[0], mass * unit[1], mass * unit[2], mass * unit[3]};
+  apply_modes<true>(
+      R, stiffness, constants.stiffness, inertia, [](const auto&) {}, m);
+  to_corners(m, f);
 }
 
 /// f = [R] K ([R]^T (x + u) - x), the elastic force of one cell; f may be u.
@@ -173,14 +254,16 @@ template <class T>
 KERF_HD void elastic_force(const Vec3<T> (&u)[kCorners], const Quat<T>& rotation, T side,
                            T stiffness, const ModeStiffness<T>& k, Vec3<T> (&f)[kCorners]) {
   const Mat3<T> D = to_matrix_less_identity(rotation), R = Mat3<T>::identity() + D;
-  for (int i = 0; i < kCorners; ++i) f[i] = u[i];
-  to_modes(f);
+  T m[3][kCorners];
+  to_modes(u, m);
   const T rest = T(4) * side;
-  for (int s = 1; s < kCorners; ++s) f[s] = transpose_times(R, f[s]);
-  for (int a = 0; a < 3; ++a) f[1 << a] += rest * Vec3<T>{D[a][0], D[a][1], D[a][2]};
-  apply_modes(k, f);
-  for (int s = 1; s < kCorners; ++s) f[s] = stiffness * (R * f[s]);
-  to_corners(f);
+  const T inertia[4] = {T(0), T(0), T(0), T(0)};
+  const auto add_rest = [&](T(&l)[3][3]) {
+    for (int n = 0; n < 3; ++n)
+      for (int i = 0; i < 3; ++i) l[n][i] = fma(rest, D[n][i], l[n][i]);
+  };
+  apply_modes<false>(R, stiffness, k, inertia, add_rest, m);
+  to_corners(m, f);
 }
 
 }  // namespace kerf::kernels

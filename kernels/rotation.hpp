@@ -52,7 +52,7 @@ struct RotationStep {
 ///
 /// Needs  |q| = 1; F neither so large nor so small that its cube over- or underflows.
 template <class T>
-KERF_HD RotationStep<T> rotation_step(const Mat3<T>& F, const Quat<T>& q) {
+KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& out) {
   // det > 1e-3 tr^3 keeps the smallest eigenvalue above 0.4 % of the trace; at rest the ratio is
   // 0.037, the greatest there is.
   const T kSafe = T(1e-3);
@@ -74,7 +74,9 @@ KERF_HD RotationStep<T> rotation_step(const Mat3<T>& F, const Quat<T>& q) {
   const Vec3<T> w{half * (cxx * axial.x + cxy * axial.y + cxz * axial.z),
                   half * (cxy * axial.x + cyy * axial.y + cyz * axial.z),
                   half * (cxz * axial.x + cyz * axial.y + czz * axial.z)};
-  return {normalised(q * Quat<T>{T(1), w.x, w.y, w.z}), T(4) * dot(w, w), ascent};
+  out.next = normalised(q * Quat<T>{T(1), w.x, w.y, w.z});
+  out.length2 = T(4) * dot(w, w);
+  out.ascent = ascent;
 }
 
 /// A fixed number of Newton steps; the fast path for cells that are neither inverted nor collapsed.
@@ -84,7 +86,11 @@ KERF_HD RotationStep<T> rotation_step(const Mat3<T>& F, const Quat<T>& q) {
 /// extract_rotation.
 template <class T>
 KERF_HD Quat<T> rotation_newton(const Mat3<T>& F, Quat<T> start, int iterations) {
-  for (int i = 0; i < iterations; ++i) start = rotation_step(F, start).next;
+  RotationStep<T> step;
+  for (int i = 0; i < iterations; ++i) {
+    rotation_step(F, start, step);
+    start = step.next;
+  }
   return start;
 }
 
@@ -197,8 +203,9 @@ KERF_HD Quat<T> extract_rotation(const Mat3<T>& F, const Quat<T>& start) {
   const Mat3<T> scaled = scaled_to_one(F);
   const Quat<T> first = normalised(start);
   Quat<T> q = first;
+  RotationStep<T> step;
   for (int i = 0; i < kIterations; ++i) {
-    const RotationStep<T> step = rotation_step(scaled, q);
+    rotation_step(scaled, q, step);
     if (!step.ascent) break;
     q = step.next;
     if (step.length2 <= kSmall2) return q;

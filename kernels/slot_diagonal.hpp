@@ -23,7 +23,7 @@ KERF_HD void slot_modes(FoldCode code, int slot, T (&m)[kCorners]) {
   T w[kCorners][kCorners];
   fold_weights(code, w);
   for (int i = 0; i < kCorners; ++i) m[i] = w[i][slot];
-  walsh_transform(m);
+  to_modes(m);
 }
 
 /// Whether a slot moves corners other than its own, or not even that.

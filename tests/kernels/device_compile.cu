@@ -18,6 +18,7 @@
 #include "kernels/slot_diagonal.hpp"
 #include "kernels/surface.hpp"
 #include "kernels/transfer.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::kernels {
 
