@@ -86,6 +86,17 @@ bool all(const PackMask<S>& mask) {
 #endif
 }
 
+/// The greater of |a| and b, at least zero; b where a is not a number.
+inline Pack<float> greater_size(const Pack<float>& a, const Pack<float>& b) {
+#if defined(__AVX2__) && defined(__FMA__)
+  const __m256 size = _mm256_andnot_ps(_mm256_set1_ps(-0.0F), __m256(a.v));
+  return Pack<float>::Vector(_mm256_max_ps(size, __m256(b.v)));
+#else
+  const Pack<float> size = select(a < Pack<float>(0), -a, a);
+  return select(b < size, size, b);
+#endif
+}
+
 inline Pack<float> fma(const Pack<float>& a, const Pack<float>& b, const Pack<float>& c) {
 #if defined(__AVX2__) && defined(__FMA__)
   return Pack<float>::Vector(_mm256_fmadd_ps(__m256(a.v), __m256(b.v), __m256(c.v)));

@@ -207,11 +207,14 @@ class StoredMatrices {
   }
 
   void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
-    P greatest = P(0);
-    for (int e = 0; e < count; ++e) {
-      greatest = select(greatest < entries[e], entries[e], greatest);
-      greatest = select(greatest < -entries[e], -entries[e], greatest);
-    }
+    // Several at a time, since each waits for the one before.
+    P sizes[4] = {P(0), P(0), P(0), P(0)};
+    int done = 0;
+    for (; done + 4 <= count; done += 4)
+      for (int k = 0; k < 4; ++k) sizes[k] = greater_size(entries[done + k], sizes[k]);
+    for (; done < count; ++done) sizes[0] = greater_size(entries[done], sizes[0]);
+    const P greatest =
+        greater_size(greater_size(sizes[0], sizes[1]), greater_size(sizes[2], sizes[3]));
     const P none = P(S(1e-30));
     const P unit = select(greatest > none, greatest, none) * P(S(1) / S(32767));
     const P inverse = P(S(1)) / unit;
