@@ -9,7 +9,7 @@
 // H^T H = 8 I. Reflections of the cube split K = H^T S H into eight 3x3 blocks. H acts on corners
 // and a rotation on components, so they commute and [R] K [R]^T = H^T [R] S [R]^T H.
 //
-// Layout  Arrays of 8 Vec3: by corner x + 2 y + 4 z, or by mode with the same bits.
+// Layout  By corner x + 2 y + 4 z: 8 Vec3. By mode, with the same bits: [component][mode].
 // Units   As hex_element.hpp: E = 1, side = 1; stiffness = E side in N/m, mass = rho side^3 in kg
 //         (or kg/s^2 as a time scheme scales it).
 // Source  Derived here; K of Dick, Georgii, Westermann 2011 [DGW11], section 6.4.
