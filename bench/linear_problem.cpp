@@ -106,10 +106,9 @@ Convergence LinearProblem::measure(bool error_of_cg) {
   // The error of A u = 0 is u itself; the largest eigenvector of the cycle remains.
   const int cycles = setup_.cells > 48 ? 24 : 60;
   constexpr int last = 8;
-  const SolverSetup& setup = setup_.solver;
-  const bool alone = setup.method == SolverMethod::multigrid;
+  const bool alone = setup_.solver.method == SolverMethod::multigrid;
   Cycle cycle(*backend_, static_cast<int>(hierarchy_.levels.size()),
-              {cycle_in_use(), setup.pre_sweeps, setup.post_sweeps, !alone});
+              cycle_options(setup_.solver, hierarchy_));
   backend_->zero(0, kRight);
   backend_->write(0, kSolution, noise(3 * hierarchy_.levels[0].point.size()));
   backend_->mask(0, kSolution);

@@ -38,7 +38,7 @@ class LinearProblem {
   /// `error_of_cg`: also solve to rounding, to count iterations by the error.
   Convergence measure(bool error_of_cg = true);
   const Hierarchy& hierarchy() const { return hierarchy_; }
-  CycleType cycle_in_use() const { return solver_->cycle_in_use(); }
+  const CycleOptions& cycle_in_use() const { return solver_->cycle_in_use(); }
 
  private:
   double error(int x) const;  // relative to exact_

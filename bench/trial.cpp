@@ -51,11 +51,7 @@ void Trial::use_smoother(SmootherType type) {
 }
 
 Cycle Trial::cycle() {
-  const SolverSetup& setup = candidate.solver;
-  CycleOptions options{setup.cycle, setup.pre_sweeps, setup.post_sweeps, !is_paper()};
-  if (options.type == CycleType::automatic)  // as LinearSolver chooses
-    options.type = body.hierarchy().cut ? CycleType::k : CycleType::v;
-  return Cycle(backend(), machine.levels(), options);
+  return Cycle(backend(), machine.levels(), cycle_options(candidate.solver, body.hierarchy()));
 }
 
 std::vector<double> Trial::read(int level, int x) {

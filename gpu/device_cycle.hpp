@@ -245,7 +245,8 @@ void DeviceBackend<Device, S>::solve_coarse(int level, const CycleOptions& optio
     level_at(level).solution_is_zero = false;
     return;
   }
-  if (level == last_level() || options.type == CycleType::v) {
+  const bool once = options.type == CycleType::v || level < options.first_twice;
+  if (level == last_level() || once) {
     descend(level, options);
   } else if (options.type == CycleType::w) {
     descend(level, options);

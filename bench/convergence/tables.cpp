@@ -228,7 +228,10 @@ Record run_case(const Table& table, const Case& one, int threads) {
   out.cells = setup.cells;
   out.vertices = c.vertices;
   out.hierarchy = setup.solver.duplicate_cells ? "duplicated" : "by place";
-  out.cycle = name_of(problem.cycle_in_use());
+  const CycleOptions& cycle = problem.cycle_in_use();
+  out.cycle = name_of(cycle.type);
+  if (cycle.type == CycleType::k && cycle.first_twice > 1)
+    out.cycle = text(out.cycle, " from level ", cycle.first_twice);
   out.smoother = relaxes ? "Gauss-Seidel" : "Chebyshev";
   out.sweeps = is_alone ? "forward" : "symmetric";
   out.omega = relaxes ? setup.solver.omega : kNone;

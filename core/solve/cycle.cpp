@@ -5,6 +5,21 @@
 
 namespace kerf {
 
+CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy) {
+  CycleOptions options{setup.cycle, setup.pre_sweeps, setup.post_sweeps};
+  if (setup.cycle == CycleType::automatic) {
+    options.type = hierarchy.cut ? CycleType::k : CycleType::v;
+    // Of an octree level 1 has a third of the cells: a second visit costs more than it gains.
+    constexpr int kFew = 4;
+    const auto& levels = hierarchy.levels;
+    const bool costs = levels.size() > 1 && kFew * levels[1].cells() > levels[0].cells();
+    options.first_twice = costs ? 2 : 1;
+  }
+  // As a solver of its own, Gauss-Seidel in one order contracts faster than forward then backward.
+  options.symmetric = setup.method == SolverMethod::cg;
+  return options;
+}
+
 void Cycle::descend(int level) {
   if (level == coarsest_) {
     backend_.solve_coarsest();
@@ -20,7 +35,8 @@ void Cycle::descend(int level) {
 }
 
 void Cycle::solve_coarse(int level) {
-  if (level == coarsest_ || options_.type == CycleType::v) {
+  const bool once = options_.type == CycleType::v || level < options_.first_twice;
+  if (level == coarsest_ || once) {
     descend(level);
   } else if (options_.type == CycleType::w) {
     descend(level);

@@ -15,9 +15,15 @@ struct CycleOptions {
   int pre_sweeps = 1, post_sweeps = 1;
   /// Post-smoothing runs the colours backwards, so that the cycle may precondition CG.
   bool symmetric = true;
+  /// W and K: the first level, from 1 on, that is solved twice.
+  int first_twice = 1;
 
   bool operator==(const CycleOptions&) const = default;
 };
+
+/// What a setup asks for on these levels. Measured (docs/convergence.md): on cut bodies the coarse
+/// cells are too stiff in bending, and K-cycles repair it; on uncut ones V costs less.
+CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy);
 
 class Cycle {
  public:

@@ -29,15 +29,9 @@ void LinearSolver::set_structure(const Hierarchy& hierarchy) {
   const AddTime time(times_.structure);
   hierarchy_ = &hierarchy;
   factor_due_ = true;
-  cycle_type_ = setup_.cycle;
-  // Measured (docs/convergence.md): on cut bodies the coarse cells are too stiff in bending, and
-  // K-cycles repair it; on uncut ones V costs less.
-  if (cycle_type_ == CycleType::automatic)
-    cycle_type_ = hierarchy.cut ? CycleType::k : CycleType::v;
-  CycleOptions options{cycle_type_, setup_.pre_sweeps, setup_.post_sweeps, true};
-  // As a solver of its own, Gauss-Seidel in one order contracts faster than forward then backward.
-  options.symmetric = setup_.method == SolverMethod::cg;
-  cycle_ = std::make_unique<Cycle>(backend_, static_cast<int>(hierarchy.levels.size()), options);
+  cycle_options_ = cycle_options(setup_, hierarchy);
+  cycle_ =
+      std::make_unique<Cycle>(backend_, static_cast<int>(hierarchy.levels.size()), cycle_options_);
   if (setup_.method == SolverMethod::cholesky) {
     assembled_ = std::make_unique<AssembledLevel>(hierarchy.levels[0]);
     cholesky_ = std::make_unique<SparseCholesky>(CholeskyEngine::supernodal);

@@ -49,7 +49,7 @@ class LinearSolver {
   /// Gives the memory of these, and of another, back until the next solve.
   void release();
 
-  CycleType cycle_in_use() const { return cycle_type_; }
+  const CycleOptions& cycle_in_use() const { return cycle_options_; }
   const SolverTimes& times() const { return times_; }
   /// How often the coarsest level was factored.
   int factors() const { return factors_; }
@@ -68,7 +68,7 @@ class LinearSolver {
   Backend& backend_;
   SolverSetup setup_;
   const Hierarchy* hierarchy_ = nullptr;
-  CycleType cycle_type_ = CycleType::v;
+  CycleOptions cycle_options_;
   std::unique_ptr<Cycle> cycle_;
   std::unique_ptr<AssembledLevel> assembled_;
   std::unique_ptr<SparseCholesky> cholesky_;

@@ -175,7 +175,18 @@ TEST(Solver, AutomaticCycleIsKOnCutBodiesOnly) {
     LinearSolver solver(*backend, {});
     backend->load(p.hierarchy);
     solver.set_structure(p.hierarchy);
-    EXPECT_EQ(solver.cycle_in_use(), cut ? CycleType::k : CycleType::v);
+    EXPECT_EQ(solver.cycle_in_use().type, cut ? CycleType::k : CycleType::v);
+    EXPECT_EQ(solver.cycle_in_use().first_twice, 1);
+  }
+}
+
+TEST(Solver, AutomaticCycleSolvesLevelOneOnceWhereItIsLarge) {
+  for (const std::string name : {"uniform", "ball"}) {
+    const Problem p(name, Case::static_options());
+    const auto& levels = p.hierarchy.levels;
+    const bool is_large = 4 * levels[1].cells() > levels[0].cells();
+    EXPECT_EQ(is_large, name == "ball");
+    EXPECT_EQ(cycle_options({}, p.hierarchy).first_twice, is_large ? 2 : 1);
   }
 }
 
