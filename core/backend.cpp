@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/backend.hpp"
 
+#include <cmath>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -17,6 +18,14 @@ constexpr const char* kNoUpdates = "a backend without updates is asked for one";
 
 }  // namespace
 
+ConjugateVectors Backend::conjugate_vectors() { return {add_vector(), add_vector(), add_vector()}; }
+
+double Backend::true_residual(int b, int x, int r) {
+  apply(0, x, r);
+  combine(0, 1, b, -1, r);
+  return std::sqrt(dot(0, r, r));
+}
+
 std::array<double, 2> Backend::dots(int x, int y, int z) { return {dot(0, x, y), dot(0, x, z)}; }
 
 std::array<double, 2> Backend::advance_direction(int z, double beta, int d, int q, int r) {
@@ -32,6 +41,20 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
   add(0, a, d, x);
   add(0, -a, q, r);
   return dot(0, r, r);
+}
+
+double Backend::subtract_elastic_force(int displacement, int out, int work) {
+  elastic_force(displacement, work);
+  mask(0, work);
+  add(0, -1, work, out);
+  return dot(0, work, work);
+}
+
+double Backend::subtract_scaled(const OperatorScale& scale, int in, int out, int work) {
+  apply_scaled(scale, in, work);
+  mask(0, work);
+  add(0, -1, work, out);
+  return dot(0, work, work);
 }
 
 void Backend::write_noise(int level, int x, std::size_t size) {

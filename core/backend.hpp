@@ -46,6 +46,12 @@ struct SmootherOptions {
   double smallest = 1.0 / 8;  ///< Chebyshev: lower end of the range, relative to the upper
 };
 
+/// Vectors of level 0 for conjugate gradients.
+struct ConjugateVectors {
+  int residual, direction, product;
+  bool exact = true;  ///< all are double, of no other use, and free between solves
+};
+
 /// What a step of conjugate gradients leaves to the next one.
 struct ConjugateState {
   double rho = 0, alpha = 0;  ///< r.z and the length of the step
@@ -70,7 +76,8 @@ class Backend {
  public:
   virtual ~Backend() = default;
   virtual const char* name() const noexcept = 0;  ///< "cpu" or "cuda"
-  /// Of the processor, that the loops are compiled for: "baseline", "avx2", ...; empty: on a device.
+  /// Of the processor, that the loops are compiled for: "baseline", "avx2", ...; empty: on a
+  /// device.
   virtual const char* instruction_set() const noexcept { return ""; }
   virtual int threads() const noexcept = 0;
   virtual std::size_t bytes() const = 0;
@@ -93,7 +100,7 @@ class Backend {
   /// One more vector on level 0; stays through later loads.
   virtual int add_vector() = 0;
   /// The same for what may be rounded to the precision of the cycle: not a force, nor what one is
-  /// made from, nor for the fused operations of conjugate gradients.
+  /// made from.
   virtual int add_rough_vector() { return add_vector(); }
   /// One that was added is zero from now on; its memory may be given back until it is used again.
   virtual void release(int x) { zero(0, x); }
@@ -128,8 +135,13 @@ class Backend {
   /// the operations above.
   virtual bool run_cycle(const CycleOptions&) { return false; }
 
-  // Conjugate gradients on level 0, in vectors that were added. A backend may fuse what is here
-  // said with the operations above.
+  // Conjugate gradients on level 0: r, d and q are those of conjugate_vectors(), z is kSolution, b
+  // and x were added. A backend may fuse what is here said with the operations above.
+  /// Called once. The residual may be kRight itself, so that a cycle finds it there, and r, d and q
+  /// may be of its precision: q is then the product with the rounded d, and x follows that d.
+  virtual ConjugateVectors conjugate_vectors();
+  /// r = b - A x, from x and b as they are; returns |r|.
+  virtual double true_residual(int b, int x, int r);
   /// x.y and x.z.
   virtual std::array<double, 2> dots(int x, int y, int z);
   /// d = z + beta d and q = A d; returns d.q and d.r.
@@ -145,6 +157,12 @@ class Backend {
   virtual void elastic_force(int displacement, int out) = 0;
   /// out = (scale.stiffness [R] K [R]^T + scale.mass M) in; held components too.
   virtual void apply_scaled(const OperatorScale& scale, int in, int out) = 0;
+
+  /// out -= elastic_force in free components; returns the sum of the squares of what was taken off.
+  /// Anything may be left in `work`.
+  virtual double subtract_elastic_force(int displacement, int out, int work);
+  /// The same of apply_scaled.
+  virtual double subtract_scaled(const OperatorScale& scale, int in, int out, int work);
 
   // A surface bound to the cells of level 0.
   /// Positions of points that move with their cells, m: reference + u. Free slots keep theirs.

@@ -263,6 +263,40 @@ void FastBackend<S>::sum_forces(int in, int out, const Cells& cells) {
 }
 
 template <class S>
+template <class Cells>
+double FastBackend<S>::subtract_forces(int in, int out, const Cells& cells) {
+  using V = Vec3<Pack<double>>;
+  expects_exact(in, out);
+  settle();
+  FastLevel<S>& l = levels_[0];
+  const double* u = l.vectors[in].exact.data();
+  double* to = l.vectors[out].exact.data();
+  const Sums sums = sweep<double>(
+      0, kNothingBefore, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u, cells,
+      [&](std::size_t tile, int first, const V& sum, const auto&) {
+        const V force = masked(sum, l.fixed(tile, first));
+        store_tile(to, tile, first, load_tile(static_cast<const double*>(to), tile, first) - force);
+        return Sums{dot_lanes(force, force)};
+      });
+  return sums.first;
+}
+
+template <class S>
+double FastBackend<S>::subtract_scaled(const OperatorScale& scale, int in, int out, int) {
+  return subtract_forces(in, out, [&](std::size_t group, const double* x, double* y) {
+    finest_products(levels_[0].patched, exact_, scale, group, x, y);
+  });
+}
+
+template <class S>
+double FastBackend<S>::subtract_elastic_force(int displacement, int out, int) {
+  return subtract_forces(displacement, out, [&](std::size_t group, const double* x, double* y) {
+    elastic_forces(levels_[0].patched, exact_, group, x, y);
+  });
+}
+
+template <class S>
 void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
   sum_forces(in, out, [&](std::size_t group, const double* x, double* y) {
     finest_products(levels_[0].patched, exact_, scale, group, x, y);

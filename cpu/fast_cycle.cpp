@@ -323,64 +323,76 @@ double FastBackend<S>::dot(int level, int x, int y) {
 }
 
 template <class S>
-std::array<double, 2> FastBackend<S>::dots(int x, int y, int z) {
-  expects_exact(y, z);
+double FastBackend<S>::true_residual(int b, int x, int r) {
+  using V = Vec3<Pack<double>>;
+  expects_exact(b, x);
   settle();
   FastLevel<S>& l = levels_[0];
-  const double *b = l.vectors[y].exact.data(), *c = l.vectors[z].exact.data();
-  std::array<double, 2> out{};
-  with_types(l.vectors[x], l.vectors[y], [&](const auto* a, const auto*) {
-    out = sum_scalars<2>(l.scalars(), [&](std::int32_t i) {
-      const auto at = static_cast<double>(a[i]);
-      return std::array{at * b[i], at * c[i]};
-    });
-  });
-  return out;
+  const double *right = l.vectors[b].exact.data(), *u = l.vectors[x].exact.data();
+  S* const to = l.at(r);
+  const Sums sums = sweep<double>(
+      0, kNothingBefore, kNothingBefore,
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const double* in, double* out) { add_products(0, group, in, out); },
+      [&](std::size_t tile, int first, const V& sum, const auto&) {
+        const V at = load_tile(right, tile, first) - masked(sum, l.fixed(tile, first));
+        store_tile_as(to, tile, first, at);
+        return Sums{dot_lanes(at, at)};
+      });
+  return std::sqrt(sums.first);
 }
 
 template <class S>
-std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int d, int q, int r) {
-  using V = Vec3<Pack<double>>;
-  expects_exact(d, q);
-  expects_exact(r, r);
+std::array<double, 2> FastBackend<S>::dots(int x, int y, int z) {
   settle();
   FastLevel<S>& l = levels_[0];
-  double *to = l.vectors[d].exact.data(), *product = l.vectors[q].exact.data();
-  const double* residual = l.vectors[r].exact.data();
-  Sums sums;
-  with_types(l.vectors[z], l.vectors[d], [&](const auto* from, const auto*) {
-    const auto advance = [&](std::size_t tile, int first) {
-      V at = load_tile_as<double>(from, tile, first);
-      if (beta != 0)
-        at += Pack<double>(beta) * load_tile(static_cast<const double*>(to), tile, first);
-      store_tile(to, tile, first, at);
-      return at;
-    };
-    sums = sweep<double>(
-        0, [&](std::size_t tile) { for_packs<double>([&](int first) { advance(tile, first); }); },
-        kNothingBefore, advance, to,
-        [&](std::size_t group, const double* x, double* y) { add_products(0, group, x, y); },
-        [&](std::size_t tile, int first, const V& sum, const auto& value) {
-          const V at = value(), out = masked(sum, l.fixed(tile, first));
-          store_tile(product, tile, first, out);
-          return Sums{dot_lanes(at, out), dot_lanes(at, load_tile(residual, tile, first))};
-        });
+  const S *a = l.at(x), *b = l.at(y), *c = l.at(z);
+  return sum_scalars<2>(l.scalars(), [&](std::int32_t i) {
+    const auto at = static_cast<double>(a[i]);
+    return std::array{at * static_cast<double>(b[i]), at * static_cast<double>(c[i])};
   });
+}
+
+// The product is that of the direction as it is stored, in double: what rounding changes is the
+// direction, not what belongs to it.
+template <class S>
+std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int d, int q, int r) {
+  using V = Vec3<Pack<double>>;
+  settle();
+  FastLevel<S>& l = levels_[0];
+  const S *from = l.at(z), *residual = l.at(r);
+  S *to = l.at(d), *product = l.at(q);
+  const auto advance = [&](std::size_t tile, int first) {
+    V at = load_tile_as<double>(from, tile, first);
+    if (beta != 0)
+      at += Pack<double>(beta) * load_tile_as<double>(static_cast<const S*>(to), tile, first);
+    return store_tile_as(to, tile, first, at);
+  };
+  const Sums sums = sweep<double>(
+      0, [&](std::size_t tile) { for_packs<double>([&](int first) { advance(tile, first); }); },
+      kNothingBefore, advance, static_cast<const S*>(to),
+      [&](std::size_t group, const double* x, double* y) { add_products(0, group, x, y); },
+      [&](std::size_t tile, int first, const V& sum, const auto& value) {
+        const V at = value(), out = masked(sum, l.fixed(tile, first));
+        store_tile_as(product, tile, first, out);
+        return Sums{dot_lanes(at, out), dot_lanes(at, load_tile_as<double>(residual, tile, first))};
+      });
   return {sums.first, sums.second};
 }
 
 template <class S>
 double FastBackend<S>::advance_solution(double a, int d, int q, int x, int r) {
-  expects_exact(d, q);
-  expects_exact(x, r);
+  expects_exact(x, x);
   settle();
   FastLevel<S>& l = levels_[0];
-  const double *direction = l.vectors[d].exact.data(), *product = l.vectors[q].exact.data();
-  double *solution = l.vectors[x].exact.data(), *residual = l.vectors[r].exact.data();
+  const S *direction = l.at(d), *product = l.at(q);
+  double* solution = l.vectors[x].exact.data();
+  S* residual = l.at(r);
   return sum_scalars<1>(l.scalars(), [&](std::int32_t i) {
-    solution[i] += a * direction[i];
-    residual[i] -= a * product[i];
-    return std::array{residual[i] * residual[i]};
+    solution[i] += a * static_cast<double>(direction[i]);
+    const double left = static_cast<double>(residual[i]) - a * static_cast<double>(product[i]);
+    residual[i] = static_cast<S>(left);
+    return std::array{left * left};
   })[0];
 }
 

@@ -150,6 +150,9 @@ class FastBackend final : public Backend {
   }
   int add_vector() override { return append_vector(true); }
   int add_rough_vector() override { return append_vector(kIsDouble); }
+  ConjugateVectors conjugate_vectors() override {
+    return {kRight, append_vector(kIsDouble), append_vector(kIsDouble), false};
+  }
   void release(int x) override;
 
   void set_operator(const OperatorScale& scale) override;
@@ -171,12 +174,15 @@ class FastBackend final : public Backend {
   void apply(int level, int in, int out) override;
   void precondition_jacobi(int level, int in, int out) override;
 
+  double true_residual(int b, int x, int r) override;
   std::array<double, 2> dots(int x, int y, int z) override;
   std::array<double, 2> advance_direction(int z, double beta, int d, int q, int r) override;
   double advance_solution(double a, int d, int q, int x, int r) override;
 
   void elastic_force(int displacement, int out) override;
   void apply_scaled(const OperatorScale& scale, int in, int out) override;
+  double subtract_elastic_force(int displacement, int out, int work) override;
+  double subtract_scaled(const OperatorScale& scale, int in, int out, int work) override;
   void move_points(std::span<const BoundPoint> points, int displacement,
                    std::span<Vec3d> positions) override;
   void surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
@@ -223,8 +229,8 @@ class FastBackend final : public Backend {
   const FinestValues<T>& values_of() const;
   template <class T>
   T* partial_sums(std::size_t scalars);
-  template <class T, class Before, class Start, class Own, class Cells, class Finish>
-  Sums sweep(int level, const Before& before, const Start& start, const Own& own, const T* u,
+  template <class T, class From, class Before, class Start, class Own, class Cells, class Finish>
+  Sums sweep(int level, const Before& before, const Start& start, const Own& own, const From* u,
              const Cells& cells, const Finish& finish);
   template <class T>
   void add_products(int level, std::size_t group, const T* x, T* y) const;
@@ -232,6 +238,8 @@ class FastBackend final : public Backend {
   void apply_typed(int level, int in, int out);
   template <class Cells>
   void sum_forces(int in, int out, const Cells& cells);
+  template <class Cells>
+  double subtract_forces(int in, int out, const Cells& cells);
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
   void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
@@ -291,15 +299,16 @@ T* FastBackend<S>::partial_sums(std::size_t scalars) {
   return reinterpret_cast<T*>(partial_.data());
 }
 
-/// One pass over the cells of a level, from the vector u to what finish makes of the sums.
+/// One pass over the cells of a level, from the vector u to what finish makes of the sums; u may be
+/// of another precision than the arithmetic, T.
 /// before(tile): shared tiles, first of all, in any order. start(patch): before what is asked of a
 /// patch, on the same thread. own, cells, finish: see PatchPoints; cells gets (group, x, y). finish
 /// of a shared tile reads x from u. Returns the sum of what finish
 /// returns, in an order that threads do not change.
 template <class S>
-template <class T, class Before, class Start, class Own, class Cells, class Finish>
+template <class T, class From, class Before, class Start, class Own, class Cells, class Finish>
 Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, const Own& own,
-                           const T* u, const Cells& cells, const Finish& finish) {
+                           const From* u, const Cells& cells, const Finish& finish) {
   const PatchedLevel& l = levels_[level].patched;
   const auto patches = static_cast<std::int32_t>(l.patches.size());
   const auto shared = static_cast<std::int32_t>(l.shared_tiles.size());
@@ -325,7 +334,7 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
       Sums sum;
       for_packs<T>([&](int first) {
         sum += finish(tile, first, shared_sums(l, n, first, partial),
-                      [&] { return load_tile(u, tile, first); });
+                      [&] { return load_tile_as<T>(u, tile, first); });
       });
       sums[l.patches.size() + static_cast<std::size_t>(n)] = sum;
     }

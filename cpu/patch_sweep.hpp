@@ -62,6 +62,18 @@ kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) 
   return out;
 }
 
+/// To a vector of any precision; returns what is there now.
+template <class To, class S>
+kernels::Vec3<Pack<S>> store_tile_as(To* x, std::size_t tile, int first, kernels::Vec3<Pack<S>> v) {
+  typedef To Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(To))));
+  for (int c = 0; c < 3; ++c) {
+    const Narrow narrow = __builtin_convertvector(v[c].v, Narrow);
+    __builtin_memcpy(x + kTileScalars * tile + kGroup * c + first, &narrow, sizeof narrow);
+    v[c].v = __builtin_convertvector(narrow, typename Pack<S>::Vector);
+  }
+  return v;
+}
+
 template <class S>
 void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>& v) {
   S* to = x + kTileScalars * tile + first;
@@ -139,16 +151,16 @@ class PatchPoints {
   S* y() const { return y_; }
 
   /// own(tile, first lane): the vectors of vertices of this patch alone; shared vertices from u.
-  template <class Own>
-  void load(const Own& own, const S* u) {
+  template <class Own, class From>
+  void load(const Own& own, const From* u) {
     for (std::size_t at = first_tile(); at < end_tile(); ++at)
       for_packs<S>([&](int first) { put_points(x_, own_points(at, first), own(at, first)); });
     for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k) {
-      const S* from = u + scalar_of(level_.copy_vertex[k]);
+      const From* from = u + scalar_of(level_.copy_vertex[k]);
       S* to = x_ + 4 * std::size_t(level_.copy_point[k]);
-      to[0] = from[0];
-      to[1] = from[kGroup];
-      to[2] = from[2 * kGroup];
+      to[0] = static_cast<S>(from[0]);
+      to[1] = static_cast<S>(from[kGroup]);
+      to[2] = static_cast<S>(from[2 * kGroup]);
       to[3] = 0;
     }
     interpolate_hanging();

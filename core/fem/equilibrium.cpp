@@ -23,11 +23,9 @@ Equilibrium::Equilibrium(Backend& backend, LinearSolver& solver, const TimeSetup
       right_(backend.add_vector()),
       increment_(backend.add_vector()),
       best_(backend.add_vector()),
-      previous_u_(backend.add_vector()),
-      previous_d_(backend.add_vector()),
       velocity_(backend.add_vector()),
       work_(solver.spare()[0]) {
-  for (int i = 0; i < 2 * kDepth; ++i) free_.push_back(backend_.add_rough_vector());
+  for (int i = 0; i < 2 * (kDepth + 1); ++i) free_.push_back(backend_.add_rough_vector());
 }
 
 double Equilibrium::residual() {
@@ -48,8 +46,8 @@ double Equilibrium::update(double mass_factor) {
   constexpr double kInner = 1e-3;
   backend_.set_operator({1, mass_factor});
   solver_.refresh();
-  backend_.zero(0, increment_);
-  const SolveStats solve = solver_.solve(right_, increment_, std::max(setup_.tolerance, kInner));
+  const SolveStats solve =
+      solver_.solve_from_zero(right_, increment_, std::max(setup_.tolerance, kInner));
   stats_.cycles += solve.cycles;
   stats_.linear_residual = std::max(stats_.linear_residual, solve.residual);
   ++stats_.rotation_updates;
@@ -57,37 +55,17 @@ double Equilibrium::update(double mass_factor) {
   return solve.residual;
 }
 
-// u <- u + d - sum gamma_j (du_j + dd_j), gamma least squares of d - sum gamma_j dd_j.
-void Equilibrium::anderson_step(int depth) {
-  if (depth > 0) {
-    if (static_cast<int>(du_.size()) == kDepth) {
-      free_.push_back(du_.front());
-      free_.push_back(dd_.front());
-      du_.erase(du_.begin());
-      dd_.erase(dd_.begin());
-    }
-    du_.push_back(free_.back());
-    free_.pop_back();
-    dd_.push_back(free_.back());
-    free_.pop_back();
-    // The differences may be rounded, but not what they are taken of.
-    backend_.combine(0, 1, state_.displacement, -1, previous_u_);
-    backend_.copy(0, previous_u_, du_.back());
-    backend_.combine(0, 1, increment_, -1, previous_d_);
-    backend_.copy(0, previous_d_, dd_.back());
-  }
-  backend_.copy(0, state_.displacement, previous_u_);
-  if (best_at_ == state_.displacement) best_at_ = previous_u_;
-  backend_.copy(0, increment_, previous_d_);
-
-  const int m = static_cast<int>(dd_.size());
-  backend_.add(0, 1, increment_, state_.displacement);
-  if (m == 0) return;
+/// Factors of the differences in the least-squares fit to the increment.
+std::vector<double> Equilibrium::fit() {
+  const auto m = static_cast<Eigen::Index>(dd_.size());
+  if (m == 0) return {};
   Eigen::MatrixXd gram(m, m);
   Eigen::VectorXd right(m), scale(m);
-  for (int i = 0; i < m; ++i) {
-    for (int j = 0; j <= i; ++j) gram(i, j) = gram(j, i) = backend_.dot(0, dd_[i], dd_[j]);
-    right(i) = backend_.dot(0, dd_[i], increment_);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const int row = dd_[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j <= i; ++j)
+      gram(i, j) = gram(j, i) = backend_.dot(0, row, dd_[static_cast<std::size_t>(j)]);
+    right(i) = backend_.dot(0, row, increment_);
     scale(i) = gram(i, i) > 0 ? 1 / std::sqrt(gram(i, i)) : 0;
   }
   // Scaled to a unit diagonal, so that the rank decision sees directions and not lengths.
@@ -97,9 +75,35 @@ void Equilibrium::anderson_step(int depth) {
   solver.compute(gram);
   const Eigen::VectorXd gamma =
       scale.asDiagonal() * solver.solve(scale.asDiagonal() * right).eval();
-  for (int i = 0; i < m; ++i) {
-    backend_.add(0, -gamma(i), du_[i], state_.displacement);
-    backend_.add(0, -gamma(i), dd_[i], state_.displacement);
+  return {gamma.begin(), gamma.end()};
+}
+
+// u <- u + d - sum gamma_j (du_j + dd_j), gamma least squares of d - sum gamma_j dd_j. The last
+// pair is begun when u moves, with what it moves by and this d, and ends with the next d.
+// Differences may be rounded; what u moves by stays in the increment.
+void Equilibrium::anderson_step() {
+  if (!dd_.empty()) backend_.combine(0, 1, increment_, -1, dd_.back());
+  const std::vector<double> gamma = fit();
+  begin_difference(dd_);
+  for (std::size_t i = 0; i < gamma.size(); ++i) {
+    backend_.add(0, -gamma[i], du_[i], increment_);
+    backend_.add(0, -gamma[i], dd_[i], increment_);
+  }
+  begin_difference(du_);
+  leave_best();
+  backend_.add(0, 1, increment_, state_.displacement);
+}
+
+/// The increment, as it is, becomes the newest; the oldest goes where there are too many.
+void Equilibrium::begin_difference(std::vector<int>& list) {
+  list.push_back(free_.back());
+  free_.pop_back();
+  backend_.copy(0, increment_, list.back());
+  if (static_cast<int>(du_.size()) <= kDepth) return;
+  for (auto* each : {&du_, &dd_}) {
+    backend_.release(each->front());
+    free_.push_back(each->front());
+    each->erase(each->begin());
   }
 }
 
@@ -137,14 +141,31 @@ bool Equilibrium::pseudo_time(double natural_time) {
   return true;
 }
 
-// To where it stays while iterates go on. As long as each is better than the last there is no need.
+/// Before the displacement moves by the increment. As long as each iterate is better than the last
+/// there is no need for a copy; nor where the way back loses no digits.
+void Equilibrium::leave_best() {
+  constexpr double kFar = 1e4;  // squared
+  if (best_at_ != Best::current) return;
+  const double step = backend_.dot(0, increment_, increment_);
+  const double size = backend_.dot(0, state_.displacement, state_.displacement);
+  best_at_ = Best::one_step_back;
+  if (!std::isfinite(step) || (size > 0 && step > kFar * size)) {
+    backend_.copy(0, state_.displacement, best_);
+    best_at_ = Best::kept;
+  }
+}
+
 void Equilibrium::keep_best() {
-  if (best_at_ != best_) backend_.copy(0, best_at_, best_);
-  best_at_ = best_;
+  if (best_at_ == Best::kept) return;
+  backend_.copy(0, state_.displacement, best_);
+  if (best_at_ == Best::one_step_back) backend_.add(0, -1, increment_, best_);
+  best_at_ = Best::kept;
 }
 
 void Equilibrium::go_to_best() {
-  if (best_at_ != state_.displacement) backend_.copy(0, best_at_, state_.displacement);
+  if (best_at_ == Best::kept) backend_.copy(0, best_, state_.displacement);
+  if (best_at_ == Best::one_step_back) backend_.add(0, -1, increment_, state_.displacement);
+  best_at_ = Best::current;
   stats_.residual = residual();
 }
 
@@ -152,23 +173,23 @@ NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
   stats_ = {};
   keep_rotations_ = keep_rotations;
   forget();
-  best_at_ = state_.displacement;  // to come back to if the first update is lost
+  best_at_ = Best::current;  // to come back to if the first update is lost
   stats_.residual = residual();
   double best = std::numeric_limits<double>::infinity();
-  int since_best = 0, depth = 0;
+  int since_best = 0;
   while (!(finished() && !keep_rotations_) &&
          stats_.rotation_updates < time_.nonlinear_iterations) {
     const bool kept = keep_rotations_;
     update(0);
-    anderson_step(depth++);
-    if (kept) depth = 0;  // its increment belongs to another map than the next ones
+    anderson_step();
+    if (kept) forget();  // its increment belongs to another map than the next ones
     stats_.residual = residual();
     if (progress_) progress_(stats_.rotation_updates, stats_.residual);
     if (stats_.residual < best) {
       // Only a real gain counts as progress.
       since_best = stats_.residual < 0.9 * best ? 0 : since_best + 1;
       best = stats_.residual;
-      best_at_ = state_.displacement;
+      best_at_ = Best::current;
     } else {
       ++since_best;
       keep_best();
@@ -181,10 +202,9 @@ NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
     keep_best();
     if (!pseudo_time(natural_time)) break;
     forget();
-    depth = 0;
     since_best = 0;
     best = stats_.residual;
-    best_at_ = state_.displacement;
+    best_at_ = Best::current;
   }
   if (!(stats_.residual <= best)) go_to_best();  // never end on a NaN
   stats_.converged = finished();
@@ -193,8 +213,7 @@ NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
 
 void Equilibrium::release() {
   forget();
-  for (const int x : {right_, increment_, best_, previous_u_, previous_d_, velocity_})
-    backend_.release(x);
+  for (const int x : {right_, increment_, best_, velocity_}) backend_.release(x);
   solver_.release();
 }
 

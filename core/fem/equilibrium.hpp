@@ -36,8 +36,11 @@ class Equilibrium {
  private:
   double residual();  // relative; leaves the force in right_
   double update(double mass_factor);
-  void anderson_step(int depth);
+  std::vector<double> fit();
+  void anderson_step();
+  void begin_difference(std::vector<int>& list);
   bool pseudo_time(double natural_time);
+  void leave_best();
   void keep_best();
   void go_to_best();
   void forget();  // the history
@@ -48,10 +51,12 @@ class Equilibrium {
   TimeSetup time_;
   SolverSetup setup_;
   StateVectors state_;
-  int right_, increment_, best_, previous_u_, previous_d_, velocity_, work_;
-  int best_at_ = -1;          // the vector that holds the best iterate
-  std::vector<int> du_, dd_;  // differences of iterates and of increments, newest last
-  std::vector<int> free_;     // vectors to store them in
+  enum class Best { current, one_step_back, kept };  // the displacement, less the increment; best_
+
+  int right_, increment_, best_, velocity_, work_;
+  Best best_at_ = Best::current;  // where the best iterate is
+  std::vector<int> du_, dd_;      // differences of iterates and of increments, newest last
+  std::vector<int> free_;         // vectors to store them in
   bool keep_rotations_ = false;
   NonlinearStats stats_;
   Progress progress_;

@@ -56,6 +56,7 @@ void Motion::start() {
     backend_.add(0, alpha, work_, increment_);
     backend_.add(0, -alpha, scratch_, right_);
   }
+  for (const int x : {work_, scratch_}) backend_.release(x);
   if (time_.scheme == TimeScheme::newmark) {
     backend_.copy(0, increment_, acceleration_);
     return;
@@ -70,9 +71,10 @@ void Motion::start() {
 void Motion::begin_step() {
   const double dt = time_.step;
   if (time_.scheme == TimeScheme::newmark) {
-    backend_.copy(0, acceleration_, work_);  // a_n
+    const int before = increment_;  // a_n
+    backend_.copy(0, acceleration_, before);
     backend_.combine(0, -1 / (kBeta * dt), state_.velocity, 1 - 0.5 / kBeta, acceleration_);
-    backend_.add(0, dt * (1 - kGamma), work_, state_.velocity);
+    backend_.add(0, dt * (1 - kGamma), before, state_.velocity);
     backend_.add(0, dt * kGamma, acceleration_, state_.velocity);
     return;
   }
@@ -85,25 +87,16 @@ void Motion::begin_step() {
 }
 
 void Motion::residual(int out) {
-  largest_force_ = backend_.dot(0, state_.external, state_.external);
-  const auto subtract = [&](int force) {
-    backend_.mask(0, force);
-    largest_force_ = std::max(largest_force_, backend_.dot(0, force, force));
-    backend_.add(0, -1, force, out);
-  };
+  const OperatorScale damping{material_.stiffness_damping, material_.mass_damping};
+  const double external = backend_.dot(0, state_.external, state_.external);
   backend_.copy(0, state_.external, out);
-  backend_.elastic_force(state_.displacement, work_);
-  subtract(work_);
-  backend_.copy(0, acceleration_, scratch_);
-  backend_.add(0, material_.mass_damping, state_.velocity, scratch_);
-  backend_.apply_scaled({0, 1}, scratch_, work_);
-  subtract(work_);
-  if (material_.stiffness_damping > 0) {
-    backend_.apply_scaled({material_.stiffness_damping, 0}, state_.velocity, work_);
-    subtract(work_);
-  }
+  const double elastic = backend_.subtract_elastic_force(state_.displacement, out, work_);
+  const double inertia = backend_.subtract_scaled({0, 1}, acceleration_, out, work_);
+  const double damped = damping.stiffness > 0 || damping.mass > 0
+                            ? backend_.subtract_scaled(damping, state_.velocity, out, work_)
+                            : 0;
   backend_.mask(0, out);
-  largest_force_ = std::sqrt(largest_force_);
+  largest_force_ = std::sqrt(std::max({external, elastic, inertia, damped}));
 }
 
 NonlinearStats Motion::step() {
@@ -118,8 +111,8 @@ NonlinearStats Motion::step() {
     // Later updates correct a small remainder: to the accuracy of the first one is enough.
     if (update == 0) reference = std::sqrt(backend_.dot(0, right_, right_));
     solver_.refresh();
-    backend_.zero(0, increment_);
-    const SolveStats solve = solver_.solve(right_, increment_, setup_.tolerance, reference);
+    const SolveStats solve =
+        solver_.solve_from_zero(right_, increment_, setup_.tolerance, reference);
     stats.cycles += solve.cycles;
     stats.linear_residual = std::max(stats.linear_residual, solve.residual);
     stats.converged = stats.converged && solve.converged;

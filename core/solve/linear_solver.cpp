@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/solve/linear_solver.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -12,9 +13,10 @@ namespace kerf {
 LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
     : backend_(backend),
       setup_(setup),
-      residual_(backend.add_vector()),
-      direction_(backend.add_vector()),
-      product_(backend.add_vector()) {
+      vectors_(backend.conjugate_vectors()),
+      spare_{vectors_.exact ? vectors_.direction : backend.add_vector(),
+             vectors_.exact ? vectors_.product : backend.add_vector()},
+      correction_(vectors_.exact ? vectors_.residual : backend.add_vector()) {
   SmootherOptions smoother;
   smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
   smoother.omega = setup.omega;
@@ -22,7 +24,8 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
 }
 
 void LinearSolver::release() {
-  for (const int x : {residual_, direction_, product_}) backend_.release(x);
+  for (const int x : {vectors_.residual, vectors_.direction, vectors_.product}) backend_.release(x);
+  for (const int x : {spare_[0], spare_[1], correction_}) backend_.release(x);
 }
 
 void LinearSolver::set_structure(const Hierarchy& hierarchy) {
@@ -82,16 +85,28 @@ void LinearSolver::watch_factor(const SolveStats& stats, double before) {
     factor_due_ = true;
 }
 
-double LinearSolver::true_residual(int b, int x) {
-  backend_.apply(0, x, residual_);
-  backend_.combine(0, 1, b, -1, residual_);
-  return std::sqrt(backend_.dot(0, residual_, residual_));
+SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
+  from_zero_ = false;
+  return run(b, x, tolerance, reference);
 }
 
-SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
+SolveStats LinearSolver::solve_from_zero(int b, int x, double tolerance, double reference) {
+  backend_.zero(0, x);
+  from_zero_ = true;
+  return run(b, x, tolerance, reference);
+}
+
+/// Leaves b - A x, without a product where x is known to be zero.
+double LinearSolver::first_residual(int b, int x) {
+  if (!from_zero_) return backend_.true_residual(b, x, vectors_.residual);
+  backend_.copy(0, b, vectors_.residual);
+  return norm_of_right_;
+}
+
+SolveStats LinearSolver::run(int b, int x, double tolerance, double reference) {
   const AddTime time(times_.solve);
-  const double norm_b = std::sqrt(backend_.dot(0, b, b));
-  if (reference <= 0) reference = norm_b;
+  norm_of_right_ = std::sqrt(backend_.dot(0, b, b));
+  if (reference <= 0) reference = norm_of_right_;
   if (reference == 0) {
     backend_.zero(0, x);
     return {};
@@ -112,7 +127,7 @@ SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference)
 
 // z = B r: r is the residual, z becomes kSolution. The cycle may be of another precision.
 void LinearSolver::precondition(bool jacobi) {
-  backend_.copy(0, residual_, kRight);
+  if (vectors_.residual != kRight) backend_.copy(0, vectors_.residual, kRight);
   if (jacobi) {
     backend_.precondition_jacobi(0, kRight, kSolution);
     return;
@@ -121,6 +136,8 @@ void LinearSolver::precondition(bool jacobi) {
   cycle_->run();
 }
 
+// The recursion parts from the true residual with rounding, and is then put right; its direction
+// goes on (van der Vorst, Ye 2000 [VY00]).
 // Flexible conjugate gradients: beta from the change of the residual (Polak, Ribiere), because the
 // K-cycle is not quite linear.
 SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double reference,
@@ -128,21 +145,31 @@ SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double r
   const bool fixed = setup_.cycles > 0;
   const std::int64_t limit =
       fixed ? setup_.cycles : (jacobi ? std::int64_t{50} : std::int64_t{1}) * setup_.max_cycles;
-  constexpr int kRestarts = 3;  // when the recursion and the true residual part
+  constexpr int kRestarts = 3;  // when the recursion and the true residual part; more that gain
+  constexpr double kGain = 0.1;
+  constexpr double kDigits = 1e-5;  // that a recursion in single precision is trusted with
   SolveStats stats;
-  double norm = true_residual(b, x);
+  double norm = first_residual(b, x);
   const double before = norm / reference;
-  for (int start = 0; start < kRestarts && stats.cycles < limit; ++start) {
+  double at_start = 0;
+  ConjugateState state;
+  for (int start = 0; stats.cycles < limit; ++start) {
     if (!fixed && norm <= goal) break;
-    ConjugateState state;
-    while (stats.cycles < limit && (fixed || norm > goal)) {
+    if (start >= kRestarts && !(norm < kGain * at_start)) break;
+    at_start = norm;
+    const double down_to = vectors_.exact ? goal : std::max(goal, kDigits * norm);
+    while (stats.cycles < limit && (fixed || norm > down_to)) {
       precondition(jacobi);
-      if (!backend_.advance_conjugate(kSolution, direction_, product_, x, residual_, state)) break;
+      if (!backend_.advance_conjugate(kSolution, vectors_.direction, vectors_.product, x,
+                                      vectors_.residual, state)) {
+        state = {};  // the next start has no direction
+        break;
+      }
       norm = std::sqrt(state.residual2);
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / reference);
     }
-    norm = true_residual(b, x);
+    norm = backend_.true_residual(b, x, vectors_.residual);
     if (fixed) break;
   }
   stats.residual = norm / reference;
@@ -155,12 +182,12 @@ SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) 
   const bool fixed = setup_.cycles > 0;
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
-  double norm = true_residual(b, x);
+  double norm = first_residual(b, x);
   const double before = norm / reference;
   while (stats.cycles < limit && (fixed || norm > goal)) {
     precondition(false);
     backend_.add(0, 1, kSolution, x);
-    norm = true_residual(b, x);
+    norm = backend_.true_residual(b, x, vectors_.residual);
     ++stats.cycles;
     if (progress_) progress_(stats.cycles, norm / reference);
   }
@@ -175,14 +202,15 @@ SolveStats LinearSolver::direct(int b, int x, double goal, double reference) {
   std::vector<double> right(3 * hierarchy_->levels[0].point.size()), solution(right.size());
   backend_.zero(0, x);
   SolveStats stats;
-  double norm = true_residual(b, x);
+  backend_.copy(0, b, vectors_.residual);
+  double norm = norm_of_right_;
   do {
-    backend_.read(0, residual_, right);
+    backend_.read(0, vectors_.residual, right);
     cholesky_->solve(right, solution);
-    backend_.write(0, residual_, solution);
-    backend_.mask(0, residual_);
-    backend_.add(0, 1, residual_, x);
-    norm = true_residual(b, x);
+    backend_.write(0, correction_, solution);
+    backend_.mask(0, correction_);
+    backend_.add(0, 1, correction_, x);
+    norm = backend_.true_residual(b, x, vectors_.residual);
     ++stats.cycles;
   } while (norm > goal && stats.cycles <= kRefinements);
   stats.residual = norm / reference;

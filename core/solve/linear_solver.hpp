@@ -43,9 +43,11 @@ class LinearSolver {
   /// Improves x until |b - A x| <= tolerance * reference, or by a fixed number of cycles.
   /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
   SolveStats solve(int b, int x, double tolerance, double reference = 0);
+  /// The same from x = 0, whatever x holds.
+  SolveStats solve_from_zero(int b, int x, double tolerance, double reference = 0);
 
-  /// Vectors of level 0 that hold nothing between solves, for others to use.
-  std::array<int, 2> spare() const { return {direction_, product_}; }
+  /// Vectors of level 0 in double that hold nothing between solves, for others to use.
+  std::array<int, 2> spare() const { return spare_; }
   /// Gives the memory of these, and of another, back until the next solve.
   void release();
 
@@ -60,7 +62,8 @@ class LinearSolver {
   SolveStats conjugate_gradients(int b, int x, double goal, double reference, bool jacobi);
   SolveStats multigrid(int b, int x, double goal, double reference);
   SolveStats direct(int b, int x, double goal, double reference);
-  double true_residual(int b, int x);  // leaves b - A x in kRight
+  SolveStats run(int b, int x, double tolerance, double reference);
+  double first_residual(int b, int x);
   void precondition(bool jacobi);
 
   void watch_factor(const SolveStats& stats, double before);
@@ -72,8 +75,11 @@ class LinearSolver {
   std::unique_ptr<Cycle> cycle_;
   std::unique_ptr<AssembledLevel> assembled_;
   std::unique_ptr<SparseCholesky> cholesky_;
-  int residual_;             // the true one, or the recursion of conjugate gradients
-  int direction_, product_;  // of conjugate gradients
+  ConjugateVectors vectors_;  // the residual is the true one, or that of the recursion
+  std::array<int, 2> spare_;
+  int correction_;  // of a direct solve
+  bool from_zero_ = false;
+  double norm_of_right_ = 0;
   bool factor_due_ = true;
   int factors_ = 0;
   double decades_with_new_ = 0;  // a cycle, of the first solve after it

@@ -99,6 +99,36 @@ TEST(MixedPrecision, ForcesAndRotationsStayDouble) {
     ASSERT_NEAR(rotation[1][k], rotation[0][k], kDouble);
 }
 
+// Stored in single precision, but from a product in double: its size is right where the vectors
+// nearly cancel.
+TEST(MixedPrecision, TrueResidualIsFromAProductInDouble) {
+  constexpr double kDouble = 1e-6, kSmall = 1e-7;
+  const Problem p = cut_octree();
+  const Vector x = p.free_vector(0, 31);
+  const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
+  const Loaded mixed(p, test::make_backend("mixed"), kDynamic, {}, p.deformation());
+  const int right = exact.extra, solution = exact.extra + 1;
+  test::write(*exact.backend, 0, solution, x);
+  exact.backend->apply(0, solution, right);
+  const Vector product = p.read(*exact.backend, 0, right);
+  const Vector b = product + kSmall * product.norm() * p.free_vector(0, 32).normalized();
+  Vector left[2];
+  double norm[2];
+
+  for (int i = 0; i < 2; ++i) {
+    Backend& backend = *(i == 0 ? exact : mixed).backend;
+    test::write(backend, 0, right, b);
+    test::write(backend, 0, solution, x);
+    const int r = backend.conjugate_vectors().residual;
+    norm[i] = backend.true_residual(right, solution, r);
+    left[i] = p.read(backend, 0, r);
+  }
+
+  EXPECT_NEAR(norm[0], kSmall * product.norm(), 1e-3 * norm[0]);
+  EXPECT_NEAR(norm[1], norm[0], kDouble * norm[0]);
+  EXPECT_LE(relative(left[1], left[0]), kSingle);
+}
+
 /// One solve by conjugate gradients with a K-cycle.
 Solved solve(const Problem& p, const std::string& machine, double tolerance, int threads = 1) {
   SolverSetup setup;
@@ -311,7 +341,8 @@ TEST(MixedPrecision, SolvesBodiesWithLooseCellsInDynamics) {
   options.materials = 1;
   options.with_oracle = false;
   const auto is_inside = [](const Vec3i& c) {
-    for (const Vec3i& loose : {Vec3i{40, 3, 5}, Vec3i{48, 8, 8}, Vec3i{63, 15, 15}, Vec3i{33, 0, 7}})
+    for (const Vec3i& loose :
+         {Vec3i{40, 3, 5}, Vec3i{48, 8, 8}, Vec3i{63, 15, 15}, Vec3i{33, 0, 7}})
       if (c == loose) return 1;
     return c[0] < 30 ? 1 : 0;
   };

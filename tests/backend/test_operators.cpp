@@ -132,6 +132,46 @@ TEST_P(Operators, FinestLevelIsTheAssembledMatrix) {
   }
 }
 
+TEST_P(Operators, ForcesAreTakenOffInFreeComponents) {
+  const Problem p(scene());
+  const Vector u = p.deformation();
+  const auto R = oracle::rotations(p.grids[0], p.physics, u);
+  const OperatorScale other{-0.3, 170};
+  const Vector elastic =
+      oracle::masked(oracle::elastic_force(p.grids[0], p.physics, R, u), p.fixed(0));
+  const Vector scaled =
+      oracle::masked(oracle::assemble(p.grids[0], p.physics, R, other) * u, p.fixed(0));
+  const Vector any = test::random_vector(p.unknowns(0), 23);
+  const Loaded loaded = load(p);
+  Backend& backend = *loaded.backend;
+  const int out = loaded.extra + 1, work = backend.add_vector();
+  const auto expect_off = [&](const Vector& force, double squares, const char* what) {
+    expect_close(p.read(backend, 0, out), any - force, what);
+    EXPECT_NEAR(squares, force.squaredNorm(), kRelative * force.squaredNorm()) << what;
+  };
+  test::write(backend, 0, out, any);
+  expect_off(elastic, backend.subtract_elastic_force(loaded.extra, out, work), "elastic");
+  test::write(backend, 0, out, any);
+  expect_off(scaled, backend.subtract_scaled(other, loaded.extra, out, work), "scaled");
+}
+
+TEST_P(Operators, TrueResidualIsWhatTheSystemLeaves) {
+  const Problem p(scene());
+  const auto R = oracle::rotations(p.grids[0], p.physics, p.deformation());
+  const Sparse A =
+      oracle::masked(oracle::assemble(p.grids[0], p.physics, R, kDynamic), p.fixed(0), p.fixed(0));
+  const Vector x = p.free_vector(0, 24), b = p.free_vector(0, 25), left = b - A * x;
+  const Loaded loaded = load(p);
+  Backend& backend = *loaded.backend;
+  const int right = loaded.extra, solution = loaded.extra + 1;
+  const int r = backend.conjugate_vectors().residual;
+  test::write(backend, 0, right, b);
+  test::write(backend, 0, solution, x);
+  const double norm = backend.true_residual(right, solution, r);
+  if (left.norm() > 0) expect_close(p.read(backend, 0, r), left, "true residual");
+  EXPECT_NEAR(norm, left.norm(), kRelative * left.norm());
+}
+
 TEST_P(Operators, CoarseLevelsAreTripleProducts) {
   for (const bool duplicate : {true, false})
     for (const bool lumped : {false, true})

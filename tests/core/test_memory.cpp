@@ -35,12 +35,12 @@ double bytes_a_cell(const SimulationSetup& setup, bool single_cycle) {
 
 TEST(Memory, OfAUniformBodyInMixedPrecisionIsBounded) {
   // Statics keeps a pair of differences of each update but the first: four of them here.
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::statics), true), 790);
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 760);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::statics), true), 700);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 695);
 }
 
 TEST(Memory, OfAUniformBodyInDoublePrecisionIsBounded) {
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), false), 1150);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), false), 1080);
 }
 
 TEST(Memory, WithoutBladesNoLinksAreKept) {
