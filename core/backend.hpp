@@ -26,7 +26,7 @@ enum VectorId : int {
   kResidual,   ///< f - A u
   kDirection,  ///< of the Chebyshev recursion
   kScratch,    ///< product of the Chebyshev recursion and of the Krylov methods
-  kKrylovX,    ///< two vectors of the K-cycle, and conjugate gradients on level 0
+  kKrylovX,    ///< two vectors of the K-cycle
   kKrylovV,
   kLevelVectors
 };
@@ -49,7 +49,7 @@ struct SmootherOptions {
 /// Vectors of level 0 for conjugate gradients.
 struct ConjugateVectors {
   int residual, direction, product;
-  bool exact = true;  ///< all are double, of no other use, and free between solves
+  bool rounded = false;  ///< to the precision of the cycle
 };
 
 /// What a step of conjugate gradients leaves to the next one.
@@ -102,7 +102,7 @@ class Backend {
   /// The same for what may be rounded to the precision of the cycle: not a force, nor what one is
   /// made from.
   virtual int add_rough_vector() { return add_vector(); }
-  /// One that was added is zero from now on; its memory may be given back until it is used again.
+  /// One of level 0 is zero from now on; its memory may be given back until it is used again.
   virtual void release(int x) { zero(0, x); }
 
   // Values.
@@ -137,8 +137,9 @@ class Backend {
 
   // Conjugate gradients on level 0: r, d and q are those of conjugate_vectors(), z is kSolution, b
   // and x were added. A backend may fuse what is here said with the operations above.
-  /// Called once. The residual may be kRight itself, so that a cycle finds it there, and r, d and q
-  /// may be of its precision: q is then the product with the rounded d, and x follows that d.
+  /// The residual may be kRight itself, so that a cycle finds it there, and r, d and q may be of
+  /// the precision of the cycle: q is then the product with the rounded d, and x follows that d.
+  /// What d and q hold between solves is of no use. A second call gives the same, or others.
   virtual ConjugateVectors conjugate_vectors();
   /// r = b - A x, from x and b as they are; returns |r|.
   virtual double true_residual(int b, int x, int r);

@@ -236,7 +236,7 @@ void FastBackend<S>::solve_coarsest() {
   const int last = static_cast<int>(levels_.size()) - 1;
   std::vector<double> x(3 * l.patched.packed.size());
   read(last, kRight, x);
-  coarsest_factor_.solve(x);
+  coarsest_factor_.solve(x, threads_);
   write(last, kSolution, x);
 }
 
@@ -326,6 +326,7 @@ template <class S>
 double FastBackend<S>::true_residual(int b, int x, int r) {
   using V = Vec3<Pack<double>>;
   expects_exact(b, x);
+  expects_rounded({r});
   settle();
   FastLevel<S>& l = levels_[0];
   const double *right = l.vectors[b].exact.data(), *u = l.vectors[x].exact.data();
@@ -344,6 +345,7 @@ double FastBackend<S>::true_residual(int b, int x, int r) {
 
 template <class S>
 std::array<double, 2> FastBackend<S>::dots(int x, int y, int z) {
+  expects_rounded({x, y, z});
   settle();
   FastLevel<S>& l = levels_[0];
   const S *a = l.at(x), *b = l.at(y), *c = l.at(z);
@@ -353,11 +355,12 @@ std::array<double, 2> FastBackend<S>::dots(int x, int y, int z) {
   });
 }
 
-// The product is that of the direction as it is stored, in double: what rounding changes is the
-// direction, not what belongs to it.
+// The product is that of the direction as it is stored, in double, and rounded only in the end: its
+// error is then relative to itself, and does not grow with the condition of the matrix.
 template <class S>
 std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int d, int q, int r) {
   using V = Vec3<Pack<double>>;
+  expects_rounded({z, d, q, r});
   settle();
   FastLevel<S>& l = levels_[0];
   const S *from = l.at(z), *residual = l.at(r);
@@ -383,6 +386,7 @@ std::array<double, 2> FastBackend<S>::advance_direction(int z, double beta, int 
 template <class S>
 double FastBackend<S>::advance_solution(double a, int d, int q, int x, int r) {
   expects_exact(x, x);
+  expects_rounded({d, q, r});
   settle();
   FastLevel<S>& l = levels_[0];
   const S *direction = l.at(d), *product = l.at(q);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <memory>
 #include <span>
 #include <type_traits>
@@ -128,7 +129,8 @@ struct FastLevel {
   }
 };
 
-/// S: scalar of the cycle. Vectors that are added on level 0 are double, and so are forces.
+/// S: scalar of the cycle, and of the vectors of conjugate gradients. Those that are added on level
+/// 0 are double, but for rough ones, and so are forces.
 template <class S>
 class FastBackend final : public Backend {
  public:
@@ -151,7 +153,7 @@ class FastBackend final : public Backend {
   int add_vector() override { return append_vector(true); }
   int add_rough_vector() override { return append_vector(kIsDouble); }
   ConjugateVectors conjugate_vectors() override {
-    return {kRight, append_vector(kIsDouble), append_vector(kIsDouble), false};
+    return {kRight, append_vector(kIsDouble), append_vector(kIsDouble), !kIsDouble};
   }
   void release(int x) override;
 
@@ -217,7 +219,7 @@ class FastBackend final : public Backend {
   }
   static constexpr std::int32_t kWorthGroups = 8;  // whose matrices are made
   static constexpr std::int32_t kWorthTiles = 512;
-  static constexpr std::size_t kWorthCells = 4096;  // below, waking the threads costs more
+  static constexpr std::size_t kWorthCells = 2048;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 
   static constexpr bool kIsDouble = std::is_same_v<S, double>;
@@ -258,6 +260,10 @@ class FastBackend final : public Backend {
   void settle();
   void expects_exact(int in, int out) const {
     ensures(is_exact(0, in) && is_exact(0, out), "a force is asked for in a vector of the cycle");
+  }
+  void expects_rounded(std::initializer_list<int> vectors) const {
+    for (const int x : vectors)
+      ensures(is_exact(0, x) == kIsDouble, "conjugate gradients are given other vectors");
   }
   bool is_exact(int level, int x) const { return levels_[level].vectors.is_exact(x); }
   void changed(int level, int x) {

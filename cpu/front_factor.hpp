@@ -123,19 +123,37 @@ class FrontFactor {
     return good;
   }
 
-  /// In place.
-  void solve(std::span<double> x) const {
+  /// In place. Each branch has a copy of x, so that what they add to rows of the trunk meets in
+  /// one order.
+  void solve(std::span<double> x, int threads) const {
+    constexpr std::size_t kWorthEntries = 65536;  // below, waking the threads costs more
+    if (fronts_.entries < kWorthEntries) threads = 1;
+    const std::size_t count = fronts_.branches.size();
+    std::vector<std::vector<double>> local(count, std::vector<double>(x.begin(), x.end()));
     std::vector<double> work;
-    for (const Front& front : fronts_.all) {
-      load(front, x, work);
-      forward(front, work.data());
-      store(front, work, front.rows.size(), x);
-    }
-    for (auto front = fronts_.all.rbegin(); front != fronts_.all.rend(); ++front) {
-      load(*front, x, work);
-      backward(*front, work.data());
-      store(*front, work, 0, x);
-    }
+    const auto each_branch = [&](const auto& body) {
+      for_patches(
+          0, static_cast<std::int32_t>(count), threads,
+          [] { return std::make_unique<std::vector<double>>(); },
+          [&](std::int32_t b, std::vector<double>& own) { body(std::size_t(b), own); });
+    };
+    each_branch([&](std::size_t b, std::vector<double>& own) {
+      for (const int f : fronts_.trunk) clear(fronts_.all[f], local[b]);
+      for (const int f : fronts_.branches[b]) go_forward(fronts_.all[f], local[b], own);
+    });
+    for (const std::vector<double>& from : local)
+      for (const int f : fronts_.trunk) add(fronts_.all[f], from, x);
+    for (const int f : fronts_.trunk) go_forward(fronts_.all[f], x, work);
+    for (auto f = fronts_.trunk.rbegin(); f != fronts_.trunk.rend(); ++f)
+      go_backward(fronts_.all[*f], x, work);
+    each_branch([&](std::size_t b, std::vector<double>& own) {
+      for (const int f : fronts_.trunk) take(fronts_.all[f], x, local[b]);
+      const std::vector<int>& branch = fronts_.branches[b];
+      for (auto f = branch.rbegin(); f != branch.rend(); ++f) {
+        go_backward(fronts_.all[*f], local[b], own);
+        take(fronts_.all[*f], local[b], x);
+      }
+    });
   }
 
   std::size_t bytes() const {
@@ -204,6 +222,33 @@ class FrontFactor {
           for (int a = 0; a < 3; ++a) to[child.row_place[m] + a] += *from++;
       }
     rest = {};
+  }
+
+  void go_forward(const Front& front, std::span<double> x, std::vector<double>& work) const {
+    load(front, x, work);
+    forward(front, work.data());
+    store(front, work, front.rows.size(), x);
+  }
+  void go_backward(const Front& front, std::span<double> x, std::vector<double>& work) const {
+    load(front, x, work);
+    backward(front, work.data());
+    store(front, work, 0, x);
+  }
+
+  /// body(scalar) for those that a front eliminates.
+  template <class Body>
+  static void for_scalars(const Front& front, const Body& body) {
+    for (const int v : front.vertices)
+      for (std::size_t c = 0; c < 3; ++c) body(3 * static_cast<std::size_t>(v) + c);
+  }
+  static void clear(const Front& front, std::span<double> x) {
+    for_scalars(front, [&](std::size_t i) { x[i] = 0; });
+  }
+  static void add(const Front& front, std::span<const double> from, std::span<double> x) {
+    for_scalars(front, [&](std::size_t i) { x[i] += from[i]; });
+  }
+  static void take(const Front& front, std::span<const double> from, std::span<double> x) {
+    for_scalars(front, [&](std::size_t i) { x[i] = from[i]; });
   }
 
   static void load(const Front& front, std::span<const double> x, std::vector<double>& work) {

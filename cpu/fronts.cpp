@@ -157,7 +157,7 @@ class Linking {
     for (const int child : front.below)
       for (const int v : out_.all[child].rows) out_.all[child].row_place.push_back(place_[v]);
     front.at = out_.entries;
-    out_.entries += static_cast<std::size_t>(front.height()) * front.padded_columns();
+    out_.entries += front.entries_of_factor();
     front.pivots_at = out_.pivots;
     out_.pivots += front.padded_columns();
     if (!front.rows.empty()) out_.all[front_of_[front.rows[0]]].below.push_back(f);
@@ -179,6 +179,42 @@ Fronts::Fronts(const Level& level, const AssembledLevel& matrix) {
     if (!is_held(level, v)) vertices.push_back(v);
   Dissection(level, matrix, all).divide(std::move(vertices));
   Linking(matrix, *this);
+  part();
+}
+
+void Fronts::part() {
+  std::vector<std::size_t> size(all.size());
+  std::vector<int> roots;
+  std::vector<bool> is_below(all.size());
+  for (std::size_t f = 0; f < all.size(); ++f) {
+    size[f] = all[f].entries_of_factor();
+    for (const int child : all[f].below) {
+      size[f] += size[static_cast<std::size_t>(child)];
+      is_below[static_cast<std::size_t>(child)] = true;
+    }
+  }
+  for (std::size_t f = 0; f < all.size(); ++f)
+    if (!is_below[f]) roots.push_back(static_cast<int>(f));
+  const auto smaller = [&](int a, int b) { return size[a] < size[b]; };
+  for (;;) {
+    const auto largest = std::max_element(roots.begin(), roots.end(), smaller);
+    if (largest == roots.end() || 2 * size[*largest] <= entries || all[*largest].below.empty())
+      break;
+    const int root = *largest;
+    roots.erase(largest);
+    trunk.push_back(root);
+    roots.insert(roots.end(), all[root].below.begin(), all[root].below.end());
+  }
+  std::sort(trunk.begin(), trunk.end());
+  for (const int root : roots) {
+    std::vector<int> branch{root};
+    for (std::size_t n = 0; n < branch.size(); ++n) {
+      const std::vector<int>& below = all[branch[n]].below;
+      branch.insert(branch.end(), below.begin(), below.end());
+    }
+    std::sort(branch.begin(), branch.end());
+    branches.push_back(std::move(branch));
+  }
 }
 
 }  // namespace kerf::cpu

@@ -37,6 +37,9 @@ struct Front {
 
   int columns() const { return 3 * static_cast<int>(vertices.size()); }
   int padded_columns() const { return (columns() + 3) & ~3; }
+  std::size_t entries_of_factor() const {
+    return static_cast<std::size_t>(height()) * static_cast<std::size_t>(padded_columns());
+  }
   int height() const { return (padded_columns() + 3 * static_cast<int>(rows.size()) + 3) & ~3; }
 };
 
@@ -44,9 +47,16 @@ struct Fronts {
   std::vector<Front> all;                  // in the order of elimination
   std::vector<std::vector<int>> by_depth;  // those of one depth need nothing of each other
   std::size_t entries = 0, pivots = 0;     // of the factor
+  /// For solving side by side: fronts that need nothing of other branches, each in the order of
+  /// elimination, and those above them. No branch has more than half of the entries.
+  std::vector<std::vector<int>> branches;
+  std::vector<int> trunk;
 
   Fronts() = default;
   Fronts(const Level& level, const AssembledLevel& matrix);
+
+ private:
+  void part();
 };
 
 }  // namespace kerf::cpu

@@ -80,7 +80,8 @@ std::vector<double> Equilibrium::fit() {
 
 // u <- u + d - sum gamma_j (du_j + dd_j), gamma least squares of d - sum gamma_j dd_j. The last
 // pair is begun when u moves, with what it moves by and this d, and ends with the next d.
-// Differences may be rounded; what u moves by stays in the increment.
+// They may be rounded: dd by 6e-8 of d, which is far below what the rank decision drops unless d
+// hardly changes. What u moves by stays in the increment.
 void Equilibrium::anderson_step() {
   if (!dd_.empty()) backend_.combine(0, 1, increment_, -1, dd_.back());
   const std::vector<double> gamma = fit();
@@ -90,21 +91,20 @@ void Equilibrium::anderson_step() {
     backend_.add(0, -gamma[i], dd_[i], increment_);
   }
   begin_difference(du_);
+  if (static_cast<int>(du_.size()) > kDepth)
+    for (auto* list : {&du_, &dd_}) {  // the oldest pair goes
+      free_.push_back(list->front());
+      list->erase(list->begin());
+    }
   leave_best();
   backend_.add(0, 1, increment_, state_.displacement);
 }
 
-/// The increment, as it is, becomes the newest; the oldest goes where there are too many.
+/// The increment, as it is, becomes the newest.
 void Equilibrium::begin_difference(std::vector<int>& list) {
   list.push_back(free_.back());
   free_.pop_back();
   backend_.copy(0, increment_, list.back());
-  if (static_cast<int>(du_.size()) <= kDepth) return;
-  for (auto* each : {&du_, &dd_}) {
-    backend_.release(each->front());
-    free_.push_back(each->front());
-    each->erase(each->begin());
-  }
 }
 
 // Implicit steps with a mass, as a body would fall into place, its velocity thrown away whenever
@@ -142,9 +142,9 @@ bool Equilibrium::pseudo_time(double natural_time) {
 }
 
 /// Before the displacement moves by the increment. As long as each iterate is better than the last
-/// there is no need for a copy; nor where the way back loses no digits.
+/// there is no need for a copy, unless the way back would lose more than a digit.
 void Equilibrium::leave_best() {
-  constexpr double kFar = 1e4;  // squared
+  constexpr double kFar = 100;  // squared
   if (best_at_ != Best::current) return;
   const double step = backend_.dot(0, increment_, increment_);
   const double size = backend_.dot(0, state_.displacement, state_.displacement);

@@ -34,6 +34,9 @@ class Equilibrium {
   void on_progress(Progress progress) { progress_ = std::move(progress); }
 
  private:
+  /// Where the best iterate is: the displacement; the displacement less the increment; best_.
+  enum class Best { current, one_step_back, kept };
+
   double residual();  // relative; leaves the force in right_
   double update(double mass_factor);
   std::vector<double> fit();
@@ -51,12 +54,10 @@ class Equilibrium {
   TimeSetup time_;
   SolverSetup setup_;
   StateVectors state_;
-  enum class Best { current, one_step_back, kept };  // the displacement, less the increment; best_
-
   int right_, increment_, best_, velocity_, work_;
-  Best best_at_ = Best::current;  // where the best iterate is
-  std::vector<int> du_, dd_;      // differences of iterates and of increments, newest last
-  std::vector<int> free_;         // vectors to store them in
+  Best best_at_ = Best::current;
+  std::vector<int> du_, dd_;  // differences of iterates and of increments, newest last
+  std::vector<int> free_;     // vectors to store them in
   bool keep_rotations_ = false;
   NonlinearStats stats_;
   Progress progress_;

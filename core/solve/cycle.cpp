@@ -1,19 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "core/solve/cycle.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kerf {
+
+namespace {
+
+/// Of an octree level 1 has a third of the cells: a second visit costs more than it gains. On a
+/// plate or a rod of one cell size it may have as many, but there coarse cells soon are too stiff.
+bool level_one_is_dear(const Hierarchy& hierarchy) {
+  constexpr int kFew = 4;
+  if (hierarchy.levels.size() < 2) return false;
+  const Level& finest = hierarchy.levels[0];
+  const auto& sizes = finest.size_log2;
+  const bool is_octree =
+      std::any_of(sizes.begin(), sizes.end(), [&](auto size) { return size != sizes.front(); });
+  return is_octree && kFew * hierarchy.levels[1].cells() > finest.cells();
+}
+
+}  // namespace
 
 CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy) {
   CycleOptions options{setup.cycle, setup.pre_sweeps, setup.post_sweeps};
   if (setup.cycle == CycleType::automatic) {
     options.type = hierarchy.cut ? CycleType::k : CycleType::v;
-    // Of an octree level 1 has a third of the cells: a second visit costs more than it gains.
-    constexpr int kFew = 4;
-    const auto& levels = hierarchy.levels;
-    const bool costs = levels.size() > 1 && kFew * levels[1].cells() > levels[0].cells();
-    options.first_twice = costs ? 2 : 1;
+    options.first_twice = level_one_is_dear(hierarchy) ? 2 : 1;
   }
   // As a solver of its own, Gauss-Seidel in one order contracts faster than forward then backward.
   options.symmetric = setup.method == SolverMethod::cg;

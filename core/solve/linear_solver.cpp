@@ -14,9 +14,9 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
     : backend_(backend),
       setup_(setup),
       vectors_(backend.conjugate_vectors()),
-      spare_{vectors_.exact ? vectors_.direction : backend.add_vector(),
-             vectors_.exact ? vectors_.product : backend.add_vector()},
-      correction_(vectors_.exact ? vectors_.residual : backend.add_vector()) {
+      spare_{vectors_.rounded ? backend.add_vector() : vectors_.direction,
+             vectors_.rounded ? backend.add_vector() : vectors_.product},
+      correction_(spare_[0]) {
   SmootherOptions smoother;
   smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
   smoother.omega = setup.omega;
@@ -25,7 +25,8 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
 
 void LinearSolver::release() {
   for (const int x : {vectors_.residual, vectors_.direction, vectors_.product}) backend_.release(x);
-  for (const int x : {spare_[0], spare_[1], correction_}) backend_.release(x);
+  if (vectors_.rounded)
+    for (const int x : spare_) backend_.release(x);
 }
 
 void LinearSolver::set_structure(const Hierarchy& hierarchy) {
@@ -86,43 +87,45 @@ void LinearSolver::watch_factor(const SolveStats& stats, double before) {
 }
 
 SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
-  from_zero_ = false;
-  return run(b, x, tolerance, reference);
+  return run({b, x, false}, tolerance, reference);
 }
 
 SolveStats LinearSolver::solve_from_zero(int b, int x, double tolerance, double reference) {
   backend_.zero(0, x);
-  from_zero_ = true;
-  return run(b, x, tolerance, reference);
+  return run({b, x, true}, tolerance, reference);
 }
 
-/// Leaves b - A x, without a product where x is known to be zero.
-double LinearSolver::first_residual(int b, int x) {
-  if (!from_zero_) return backend_.true_residual(b, x, vectors_.residual);
-  backend_.copy(0, b, vectors_.residual);
-  return norm_of_right_;
-}
-
-SolveStats LinearSolver::run(int b, int x, double tolerance, double reference) {
+SolveStats LinearSolver::run(Problem problem, double tolerance, double reference) {
   const AddTime time(times_.solve);
-  norm_of_right_ = std::sqrt(backend_.dot(0, b, b));
-  if (reference <= 0) reference = norm_of_right_;
-  if (reference == 0) {
-    backend_.zero(0, x);
+  problem.size = std::sqrt(backend_.dot(0, problem.b, problem.b));
+  problem.reference = reference > 0 ? reference : problem.size;
+  if (problem.reference == 0) {
+    backend_.zero(0, problem.x);
     return {};
   }
-  const double goal = tolerance * reference;
+  problem.goal = tolerance * problem.reference;
   switch (setup_.method) {
     case SolverMethod::cholesky:
-      return direct(b, x, goal, reference);
+      return direct(problem);
     case SolverMethod::multigrid:
-      return multigrid(b, x, goal, reference);
+      return multigrid(problem);
     case SolverMethod::cg_jacobi:
-      return conjugate_gradients(b, x, goal, reference, true);
+      return conjugate_gradients(problem, true);
     case SolverMethod::cg:
       break;
   }
-  return conjugate_gradients(b, x, goal, reference, false);
+  return conjugate_gradients(problem, false);
+}
+
+/// Leaves b - A x; without a product where x is zero.
+double LinearSolver::first_residual(const Problem& problem) {
+  if (!problem.from_zero) return true_residual(problem);
+  backend_.copy(0, problem.b, vectors_.residual);
+  return problem.size;
+}
+
+double LinearSolver::true_residual(const Problem& problem) {
+  return backend_.true_residual(problem.b, problem.x, vectors_.residual);
 }
 
 // z = B r: r is the residual, z becomes kSolution. The cycle may be of another precision.
@@ -136,85 +139,85 @@ void LinearSolver::precondition(bool jacobi) {
   cycle_->run();
 }
 
-// The recursion parts from the true residual with rounding, and is then put right; its direction
-// goes on (van der Vorst, Ye 2000 [VY00]).
 // Flexible conjugate gradients: beta from the change of the residual (Polak, Ribiere), because the
-// K-cycle is not quite linear.
-SolveStats LinearSolver::conjugate_gradients(int b, int x, double goal, double reference,
-                                             bool jacobi) {
+// K-cycle is not quite linear. Rounding parts the residual of the recursion from the true one, by
+// an error that follows its greatest size so far: in single precision the true one takes its place
+// every few digits, and the direction goes on (van der Vorst, Ye 2000 [VY00]).
+SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi) {
+  constexpr double kDigits = 1e-5;  // that single precision is trusted with
+  constexpr int kRetries = 2;       // where the recursion was at the goal, and the residual is not
   const bool fixed = setup_.cycles > 0;
   const std::int64_t limit =
       fixed ? setup_.cycles : (jacobi ? std::int64_t{50} : std::int64_t{1}) * setup_.max_cycles;
-  constexpr int kRestarts = 3;  // when the recursion and the true residual part; more that gain
-  constexpr double kGain = 0.1;
-  constexpr double kDigits = 1e-5;  // that a recursion in single precision is trusted with
+  const double goal = fixed ? 0 : problem.goal;
   SolveStats stats;
-  double norm = first_residual(b, x);
-  const double before = norm / reference;
-  double at_start = 0;
+  double norm = first_residual(problem);
+  const double before = norm / problem.reference;
   ConjugateState state;
-  for (int start = 0; stats.cycles < limit; ++start) {
-    if (!fixed && norm <= goal) break;
-    if (start >= kRestarts && !(norm < kGain * at_start)) break;
-    at_start = norm;
-    const double down_to = vectors_.exact ? goal : std::max(goal, kDigits * norm);
-    while (stats.cycles < limit && (fixed || norm > down_to)) {
+  for (int retries = 0; norm > goal && stats.cycles < limit && retries <= kRetries;) {
+    const double at_start = norm;
+    double greatest = norm;
+    const auto enough = [&] {
+      return norm <= goal || (vectors_.rounded && norm <= kDigits * greatest);
+    };
+    bool lost = false;
+    while (!lost && !enough() && stats.cycles < limit) {
       precondition(jacobi);
-      if (!backend_.advance_conjugate(kSolution, vectors_.direction, vectors_.product, x,
-                                      vectors_.residual, state)) {
-        state = {};  // the next start has no direction
-        break;
-      }
+      lost = !backend_.advance_conjugate(kSolution, vectors_.direction, vectors_.product, problem.x,
+                                         vectors_.residual, state);
+      if (lost) break;
       norm = std::sqrt(state.residual2);
+      greatest = std::max(greatest, norm);
       ++stats.cycles;
-      if (progress_) progress_(stats.cycles, norm / reference);
+      if (progress_) progress_(stats.cycles, norm / problem.reference);
     }
-    norm = backend_.true_residual(b, x, vectors_.residual);
-    if (fixed) break;
+    const bool was_at_goal = norm <= goal;
+    norm = true_residual(problem);
+    if (lost) state = {};  // the next start has no direction
+    if (lost || (!fixed && (was_at_goal || !(norm < at_start)))) ++retries;
   }
-  stats.residual = norm / reference;
+  stats.residual = norm / problem.reference;
   stats.converged = fixed || norm <= goal * (1 + 1e-12);
   if (!jacobi) watch_factor(stats, before);
   return stats;
 }
 
-SolveStats LinearSolver::multigrid(int b, int x, double goal, double reference) {
+SolveStats LinearSolver::multigrid(const Problem& problem) {
   const bool fixed = setup_.cycles > 0;
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
-  double norm = first_residual(b, x);
-  const double before = norm / reference;
-  while (stats.cycles < limit && (fixed || norm > goal)) {
+  double norm = first_residual(problem);
+  const double before = norm / problem.reference;
+  while (stats.cycles < limit && (fixed || norm > problem.goal)) {
     precondition(false);
-    backend_.add(0, 1, kSolution, x);
-    norm = backend_.true_residual(b, x, vectors_.residual);
+    backend_.add(0, 1, kSolution, problem.x);
+    norm = true_residual(problem);
     ++stats.cycles;
-    if (progress_) progress_(stats.cycles, norm / reference);
+    if (progress_) progress_(stats.cycles, norm / problem.reference);
   }
-  stats.residual = norm / reference;
-  stats.converged = fixed || norm <= goal;
+  stats.residual = norm / problem.reference;
+  stats.converged = fixed || norm <= problem.goal;
   watch_factor(stats, before);
   return stats;
 }
 
-SolveStats LinearSolver::direct(int b, int x, double goal, double reference) {
+SolveStats LinearSolver::direct(const Problem& problem) {
   constexpr int kRefinements = 3;  // of the solution with the same factor; one is usually enough
   std::vector<double> right(3 * hierarchy_->levels[0].point.size()), solution(right.size());
-  backend_.zero(0, x);
+  backend_.zero(0, problem.x);
   SolveStats stats;
-  backend_.copy(0, b, vectors_.residual);
-  double norm = norm_of_right_;
+  double norm = problem.size;
   do {
-    backend_.read(0, vectors_.residual, right);
+    backend_.read(0, stats.cycles == 0 ? problem.b : vectors_.residual, right);
     cholesky_->solve(right, solution);
     backend_.write(0, correction_, solution);
     backend_.mask(0, correction_);
-    backend_.add(0, 1, correction_, x);
-    norm = backend_.true_residual(b, x, vectors_.residual);
+    backend_.add(0, 1, correction_, problem.x);
+    norm = true_residual(problem);
     ++stats.cycles;
-  } while (norm > goal && stats.cycles <= kRefinements);
-  stats.residual = norm / reference;
-  stats.converged = norm <= goal;
+  } while (norm > problem.goal && stats.cycles <= kRefinements);
+  stats.residual = norm / problem.reference;
+  stats.converged = norm <= problem.goal;
   return stats;
 }
 

@@ -48,7 +48,7 @@ class LinearSolver {
 
   /// Vectors of level 0 in double that hold nothing between solves, for others to use.
   std::array<int, 2> spare() const { return spare_; }
-  /// Gives the memory of these, and of another, back until the next solve.
+  /// Gives the memory of these, and of those of conjugate gradients, back until the next solve.
   void release();
 
   const CycleOptions& cycle_in_use() const { return cycle_options_; }
@@ -59,11 +59,17 @@ class LinearSolver {
   std::size_t bytes() const;
 
  private:
-  SolveStats conjugate_gradients(int b, int x, double goal, double reference, bool jacobi);
-  SolveStats multigrid(int b, int x, double goal, double reference);
-  SolveStats direct(int b, int x, double goal, double reference);
-  SolveStats run(int b, int x, double tolerance, double reference);
-  double first_residual(int b, int x);
+  struct Problem {
+    int b, x;
+    bool from_zero;                            // x is zero
+    double size = 0, reference = 0, goal = 0;  // |b|; what residuals are relative to; to be reached
+  };
+  SolveStats run(Problem problem, double tolerance, double reference);
+  SolveStats conjugate_gradients(const Problem& problem, bool jacobi);
+  SolveStats multigrid(const Problem& problem);
+  SolveStats direct(const Problem& problem);
+  double first_residual(const Problem& problem);
+  double true_residual(const Problem& problem);
   void precondition(bool jacobi);
 
   void watch_factor(const SolveStats& stats, double before);
@@ -78,8 +84,6 @@ class LinearSolver {
   ConjugateVectors vectors_;  // the residual is the true one, or that of the recursion
   std::array<int, 2> spare_;
   int correction_;  // of a direct solve
-  bool from_zero_ = false;
-  double norm_of_right_ = 0;
   bool factor_due_ = true;
   int factors_ = 0;
   double decades_with_new_ = 0;  // a cycle, of the first solve after it

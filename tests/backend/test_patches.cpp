@@ -225,7 +225,7 @@ std::vector<double> solved_by_fronts(const Level& level, const AssembledLevel& m
   cpu::FrontFactor<S> factor;
   factor.analyse(level, matrix);
   EXPECT_TRUE(factor.factor(matrix, threads));
-  factor.solve(x);
+  factor.solve(x, threads);
   return x;
 }
 

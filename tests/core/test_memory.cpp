@@ -34,7 +34,7 @@ double bytes_a_cell(const SimulationSetup& setup, bool single_cycle) {
 }
 
 TEST(Memory, OfAUniformBodyInMixedPrecisionIsBounded) {
-  // Statics keeps a pair of differences of each update but the first: four of them here.
+  // Statics keeps a pair of differences of each update: four of them here.
   EXPECT_LE(bytes_a_cell(cube(TimeMode::statics), true), 700);
   EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 695);
 }

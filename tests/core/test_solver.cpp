@@ -181,12 +181,12 @@ TEST(Solver, AutomaticCycleIsKOnCutBodiesOnly) {
 }
 
 TEST(Solver, AutomaticCycleSolvesLevelOneOnceWhereItIsLarge) {
-  for (const std::string name : {"uniform", "ball"}) {
-    const Problem p(name, Case::static_options());
-    const auto& levels = p.hierarchy.levels;
-    const bool is_large = 4 * levels[1].cells() > levels[0].cells();
-    EXPECT_EQ(is_large, name == "ball");
-    EXPECT_EQ(cycle_options({}, p.hierarchy).first_twice, is_large ? 2 : 1);
+  const Problem few("octree2", Case::static_options()), many("ball", Case::static_options());
+  const Problem plate(LinkedOctree(test::box_body({9, 9, 1}), 0), Case::static_options());
+  for (const Problem* p : {&few, &many, &plate}) {
+    const auto& levels = p->hierarchy.levels;
+    EXPECT_EQ(4 * levels[1].cells() > levels[0].cells(), p != &few);
+    EXPECT_EQ(cycle_options({}, p->hierarchy).first_twice, p == &many ? 2 : 1);
   }
 }
 
