@@ -16,6 +16,13 @@ namespace {
 
 constexpr const char* kNoUpdates = "a backend without updates is asked for one";
 
+/// out -= force in free components, which are all that is left of it; returns its squares.
+double subtract_free(Backend& backend, int force, int out) {
+  backend.mask(0, force);
+  backend.add(0, -1, force, out);
+  return backend.dot(0, force, force);
+}
+
 }  // namespace
 
 ConjugateVectors Backend::conjugate_vectors() { return {add_vector(), add_vector(), add_vector()}; }
@@ -45,16 +52,12 @@ double Backend::advance_solution(double a, int d, int q, int x, int r) {
 
 double Backend::subtract_elastic_force(int displacement, int out, int work) {
   elastic_force(displacement, work);
-  mask(0, work);
-  add(0, -1, work, out);
-  return dot(0, work, work);
+  return subtract_free(*this, work, out);
 }
 
 double Backend::subtract_scaled(const OperatorScale& scale, int in, int out, int work) {
   apply_scaled(scale, in, work);
-  mask(0, work);
-  add(0, -1, work, out);
-  return dot(0, work, work);
+  return subtract_free(*this, work, out);
 }
 
 void Backend::write_noise(int level, int x, std::size_t size) {

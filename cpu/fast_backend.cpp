@@ -245,69 +245,61 @@ void FastBackend<S>::apply(int level, int in, int out) {
     apply_typed<S>(level, in, out);
 }
 
+/// out from what cells make of in: finish(tile, first lane, sum, to) is asked for each pack.
 template <class S>
-template <class Cells>
-void FastBackend<S>::sum_forces(int in, int out, const Cells& cells) {
+template <class Cells, class Finish>
+Sums FastBackend<S>::sum_forces(int in, int out, const Cells& cells, const Finish& finish) {
   expects_exact(in, out);
   settle();
-  FastLevel<S>& l = levels_[0];
-  const double* u = l.vectors[in].exact.data();
-  double* to = l.vectors[out].exact.data();
-  sweep<double>(
+  const double* u = levels_[0].vectors[in].exact.data();
+  double* to = levels_[0].vectors[out].exact.data();
+  return sweep<double>(
       0, kNothingBefore, kNothingBefore,
       [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u, cells,
       [&](std::size_t tile, int first, const Vec3<Pack<double>>& sum, const auto&) {
-        store_tile(to, tile, first, sum);
-        return Sums{};
+        return finish(tile, first, sum, to);
       });
+}
+
+template <class S>
+template <class Cells>
+void FastBackend<S>::put_forces(int in, int out, const Cells& cells) {
+  sum_forces(in, out, cells, [](std::size_t tile, int first, const auto& sum, double* to) {
+    store_tile(to, tile, first, sum);
+    return Sums{};
+  });
 }
 
 template <class S>
 template <class Cells>
 double FastBackend<S>::subtract_forces(int in, int out, const Cells& cells) {
-  using V = Vec3<Pack<double>>;
-  expects_exact(in, out);
-  settle();
-  FastLevel<S>& l = levels_[0];
-  const double* u = l.vectors[in].exact.data();
-  double* to = l.vectors[out].exact.data();
-  const Sums sums = sweep<double>(
-      0, kNothingBefore, kNothingBefore,
-      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u, cells,
-      [&](std::size_t tile, int first, const V& sum, const auto&) {
-        const V force = masked(sum, l.fixed(tile, first));
-        store_tile(to, tile, first, load_tile(static_cast<const double*>(to), tile, first) - force);
-        return Sums{dot_lanes(force, force)};
-      });
-  return sums.first;
-}
-
-template <class S>
-double FastBackend<S>::subtract_scaled(const OperatorScale& scale, int in, int out, int) {
-  return subtract_forces(in, out, [&](std::size_t group, const double* x, double* y) {
-    finest_products(levels_[0].patched, exact_, scale, group, x, y);
-  });
-}
-
-template <class S>
-double FastBackend<S>::subtract_elastic_force(int displacement, int out, int) {
-  return subtract_forces(displacement, out, [&](std::size_t group, const double* x, double* y) {
-    elastic_forces(levels_[0].patched, exact_, group, x, y);
-  });
+  const FastLevel<S>& l = levels_[0];
+  const auto subtract = [&](std::size_t tile, int first, const auto& sum, double* to) {
+    const auto force = masked(sum, l.fixed(tile, first));
+    store_tile(to, tile, first, load_tile(static_cast<const double*>(to), tile, first) - force);
+    return Sums{dot_lanes(force, force)};
+  };
+  return sum_forces(in, out, cells, subtract).first;
 }
 
 template <class S>
 void FastBackend<S>::apply_scaled(const OperatorScale& scale, int in, int out) {
-  sum_forces(in, out, [&](std::size_t group, const double* x, double* y) {
-    finest_products(levels_[0].patched, exact_, scale, group, x, y);
-  });
+  put_forces(in, out, scaled_cells(scale));
 }
 
 template <class S>
 void FastBackend<S>::elastic_force(int displacement, int out) {
-  sum_forces(displacement, out, [&](std::size_t group, const double* x, double* y) {
-    elastic_forces(levels_[0].patched, exact_, group, x, y);
-  });
+  put_forces(displacement, out, elastic_cells());
+}
+
+template <class S>
+double FastBackend<S>::subtract_scaled(const OperatorScale& scale, int in, int out, int) {
+  return subtract_forces(in, out, scaled_cells(scale));
+}
+
+template <class S>
+double FastBackend<S>::subtract_elastic_force(int displacement, int out, int) {
+  return subtract_forces(displacement, out, elastic_cells());
 }
 
 // The n-th children of the coarse cells in the lanes. Held components are those of slots, so where

@@ -238,8 +238,20 @@ class FastBackend final : public Backend {
   void add_products(int level, std::size_t group, const T* x, T* y) const;
   template <class T>
   void apply_typed(int level, int in, int out);
+  auto elastic_cells() const {
+    return [this](std::size_t group, const double* x, double* y) {
+      elastic_forces(levels_[0].patched, exact_, group, x, y);
+    };
+  }
+  auto scaled_cells(const OperatorScale& scale) const {
+    return [this, scale](std::size_t group, const double* x, double* y) {
+      finest_products(levels_[0].patched, exact_, scale, group, x, y);
+    };
+  }
+  template <class Cells, class Finish>
+  Sums sum_forces(int in, int out, const Cells& cells, const Finish& finish);
   template <class Cells>
-  void sum_forces(int in, int out, const Cells& cells);
+  void put_forces(int in, int out, const Cells& cells);
   template <class Cells>
   double subtract_forces(int in, int out, const Cells& cells);
   template <std::size_t kSums, class Body>

@@ -185,16 +185,11 @@ Fronts::Fronts(const Level& level, const AssembledLevel& matrix) {
 void Fronts::part() {
   std::vector<std::size_t> size(all.size());
   std::vector<int> roots;
-  std::vector<bool> is_below(all.size());
   for (std::size_t f = 0; f < all.size(); ++f) {
     size[f] = all[f].entries_of_factor();
-    for (const int child : all[f].below) {
-      size[f] += size[static_cast<std::size_t>(child)];
-      is_below[static_cast<std::size_t>(child)] = true;
-    }
+    for (const int child : all[f].below) size[f] += size[child];
+    if (all[f].rows.empty()) roots.push_back(static_cast<int>(f));
   }
-  for (std::size_t f = 0; f < all.size(); ++f)
-    if (!is_below[f]) roots.push_back(static_cast<int>(f));
   const auto smaller = [&](int a, int b) { return size[a] < size[b]; };
   for (;;) {
     const auto largest = std::max_element(roots.begin(), roots.end(), smaller);

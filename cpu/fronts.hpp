@@ -48,7 +48,8 @@ struct Fronts {
   std::vector<std::vector<int>> by_depth;  // those of one depth need nothing of each other
   std::size_t entries = 0, pivots = 0;     // of the factor
   /// For solving side by side: fronts that need nothing of other branches, each in the order of
-  /// elimination, and those above them. No branch has more than half of the entries.
+  /// elimination, and those above them. No branch of several fronts has more than half of the
+  /// entries.
   std::vector<std::vector<int>> branches;
   std::vector<int> trunk;
 

@@ -245,8 +245,7 @@ void DeviceBackend<Device, S>::solve_coarse(int level, const CycleOptions& optio
     level_at(level).solution_is_zero = false;
     return;
   }
-  const bool once = options.type == CycleType::v || level < options.first_twice;
-  if (level == last_level() || once) {
+  if (level == last_level() || options.is_once(level)) {
     descend(level, options);
   } else if (options.type == CycleType::w) {
     descend(level, options);

@@ -48,8 +48,7 @@ void Cycle::descend(int level) {
 }
 
 void Cycle::solve_coarse(int level) {
-  const bool once = options_.type == CycleType::v || level < options_.first_twice;
-  if (level == coarsest_ || once) {
+  if (level == coarsest_ || options_.is_once(level)) {
     descend(level);
   } else if (options_.type == CycleType::w) {
     descend(level);

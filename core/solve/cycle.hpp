@@ -18,6 +18,9 @@ struct CycleOptions {
   /// W and K: the first level, from 1 on, that is solved twice.
   int first_twice = 1;
 
+  /// Whether a coarse level is solved by one cycle.
+  bool is_once(int level) const { return type == CycleType::v || level < first_twice; }
+
   bool operator==(const CycleOptions&) const = default;
 };
 

@@ -15,8 +15,7 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
       setup_(setup),
       vectors_(backend.conjugate_vectors()),
       spare_{vectors_.rounded ? backend.add_vector() : vectors_.direction,
-             vectors_.rounded ? backend.add_vector() : vectors_.product},
-      correction_(spare_[0]) {
+             vectors_.rounded ? backend.add_vector() : vectors_.product} {
   SmootherOptions smoother;
   smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
   smoother.omega = setup.omega;
@@ -161,7 +160,7 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
       return norm <= goal || (vectors_.rounded && norm <= kDigits * greatest);
     };
     bool lost = false;
-    while (!lost && !enough() && stats.cycles < limit) {
+    while (!enough() && stats.cycles < limit) {
       precondition(jacobi);
       lost = !backend_.advance_conjugate(kSolution, vectors_.direction, vectors_.product, problem.x,
                                          vectors_.residual, state);
@@ -204,15 +203,16 @@ SolveStats LinearSolver::multigrid(const Problem& problem) {
 SolveStats LinearSolver::direct(const Problem& problem) {
   constexpr int kRefinements = 3;  // of the solution with the same factor; one is usually enough
   std::vector<double> right(3 * hierarchy_->levels[0].point.size()), solution(right.size());
+  const int correction = spare_[0];
   backend_.zero(0, problem.x);
   SolveStats stats;
   double norm = problem.size;
   do {
     backend_.read(0, stats.cycles == 0 ? problem.b : vectors_.residual, right);
     cholesky_->solve(right, solution);
-    backend_.write(0, correction_, solution);
-    backend_.mask(0, correction_);
-    backend_.add(0, 1, correction_, problem.x);
+    backend_.write(0, correction, solution);
+    backend_.mask(0, correction);
+    backend_.add(0, 1, correction, problem.x);
     norm = true_residual(problem);
     ++stats.cycles;
   } while (norm > problem.goal && stats.cycles <= kRefinements);

@@ -83,7 +83,6 @@ class LinearSolver {
   std::unique_ptr<SparseCholesky> cholesky_;
   ConjugateVectors vectors_;  // the residual is the true one, or that of the recursion
   std::array<int, 2> spare_;
-  int correction_;  // of a direct solve
   bool factor_due_ = true;
   int factors_ = 0;
   double decades_with_new_ = 0;  // a cycle, of the first solve after it

@@ -5,7 +5,6 @@
 // test_operators.cpp, against the oracle.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstring>
 #include <string>
 
@@ -374,20 +373,12 @@ TEST(MixedPrecision, EveryMethodSolvesFromAnything) {
         setup.method = method;
         setup.cycles = cycles;
         const auto backend = test::make_backend(machine, 2);
-        LinearSolver solver(*backend, setup);
-        const int b = backend->add_vector(), x = backend->add_vector();
-        backend->load(p.hierarchy);
-        solver.set_structure(p.hierarchy);
-        backend->set_operator(kDynamic);
-        test::write(*backend, 0, x, p.deformation());
-        backend->rotate_cells(x);
-        solver.refresh();
-        const Vector right = p.free_vector(0, 77);
-        test::write(*backend, 0, b, right);
-        test::write(*backend, 0, x, Vector::Constant(right.size(), std::nan("")));
-        const SolveStats stats = solver.solve_from_zero(b, x, 1e-11);
+        const Solved solved = test::solve(p, *backend, setup, kDynamic, 1e-11);
+        EXPECT_TRUE(solved.stats.converged);
+        const int x = backend->add_vector(), b = backend->add_vector();
+        test::write(*backend, 0, x, solved.x);
         backend->apply(0, x, b);
-        EXPECT_TRUE(stats.converged);
+        const Vector right = test::right_of_solve(p);
         // 30 cycles alone, or 30 steps with Jacobi, are too few here.
         const bool is_enough =
             cycles == 0 || method == SolverMethod::cg || method == SolverMethod::cholesky;
@@ -395,7 +386,7 @@ TEST(MixedPrecision, EveryMethodSolvesFromAnything) {
           EXPECT_LE(relative(p.read(*backend, 0, b), right), 5e-10);
         }
         if (cycles > 0 && method != SolverMethod::cholesky) {
-          EXPECT_EQ(stats.cycles, cycles);
+          EXPECT_EQ(solved.stats.cycles, cycles);
         }
       }
 }

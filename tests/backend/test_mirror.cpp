@@ -236,6 +236,28 @@ TEST_P(Parity, OfKCyclesInTheNumberOfSteps) {
   EXPECT_LE(found.stats.cycles, exact.stats.cycles + 1);
 }
 
+// By W-cycles: of K-cycles a device runs both steps where the host may stop after one.
+TEST_P(Parity, OfCyclesThatSolveLevelOneOnce) {
+  const Problem p = cut_octree();
+  ASSERT_GE(p.levels(), 4);
+  const auto solution = [&](std::unique_ptr<Backend> backend, int first_twice) {
+    const Loaded loaded(p, std::move(backend), kDynamic, {}, p.deformation());
+    loaded.backend->factor_coarsest();
+    test::write(*loaded.backend, 0, kRight, p.free_vector(0, 55));
+    loaded.backend->zero(0, kSolution);
+    CycleOptions options{CycleType::w};
+    options.first_twice = first_twice;
+    Cycle(*loaded.backend, p.levels(), options).run();
+    return p.read(*loaded.backend, 0, kSolution);
+  };
+  const Vector twice = solution(test::make_backend("cpu"), 1);
+  const Vector once = solution(test::make_backend("cpu"), 2);
+  const Vector found = solution(machine(), 2);
+  const double tolerance = is_mixed() ? 1e-4 : 1e-9;
+  EXPECT_LE(relative(found, once), tolerance);
+  EXPECT_GT(relative(twice, once), 10 * tolerance);
+}
+
 TEST_P(Parity, OfATrueResidualThatSinglePrecisionNeverSees) {
   constexpr double kFar = 1e-11;
   const Problem p = cut_octree();

@@ -3,6 +3,7 @@
 // Whole linear solves of a problem, for comparison between backends.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -16,13 +17,16 @@ inline double relative(const oracle::Vector& found, const oracle::Vector& expect
   return (found - expected).lpNorm<Eigen::Infinity>() / expected.lpNorm<Eigen::Infinity>();
 }
 
+/// The right side of `solve`.
+inline oracle::Vector right_of_solve(const Problem& p) { return p.free_vector(0, 101); }
+
 struct Solved {
   SolveStats stats;
   std::vector<double> history;  ///< residuals
   oracle::Vector x;
 };
 
-/// One solve in a deformed state, from zero.
+/// One solve in a deformed state, from zero, whatever the vector held before.
 inline Solved solve(const Problem& p, Backend& backend, const SolverSetup& setup,
                     const OperatorScale& scale, double tolerance) {
   LinearSolver solver(backend, setup);
@@ -35,9 +39,10 @@ inline Solved solve(const Problem& p, Backend& backend, const SolverSetup& setup
   write(backend, 0, x, p.deformation());
   backend.rotate_cells(x);
   solver.refresh();
-  write(backend, 0, b, p.free_vector(0, 101));
-  backend.zero(0, x);
-  out.stats = solver.solve(b, x, tolerance);
+  const oracle::Vector right = right_of_solve(p);
+  write(backend, 0, b, right);
+  write(backend, 0, x, oracle::Vector::Constant(right.size(), std::nan("")));
+  out.stats = solver.solve_from_zero(b, x, tolerance);
   out.x = p.read(backend, 0, x);
   return out;
 }
