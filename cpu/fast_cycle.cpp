@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cpu/fast_state.hpp"
-#include "cpu/near_loops.hpp"
+#include "cpu/near_patches.hpp"
 #include "cpu/surface_loops.hpp"
 
 namespace kerf::cpu {
@@ -477,9 +477,11 @@ void FastBackend<S>::read_some(int level, int x, std::span<const std::int32_t> v
 template <class S>
 NearCells FastBackend<S>::find_near(int displacement, const BladeReach& reach,
                                     std::span<const std::int32_t> opened) const {
-  std::vector<double> values(3 * levels_[0].patched.packed.size());
-  read(0, displacement, values);
-  return cpu::find_near(*hierarchy_, values, reach, opened, threads_);
+  expects_exact(displacement, displacement);
+  FastBackend& self = *const_cast<FastBackend*>(this);  // what was asked for before
+  self.settle();
+  return cpu::find_near(levels_[0].patched, hierarchy_->spacing,
+                        self.levels_[0].vectors[displacement].exact, reach, opened, threads_);
 }
 
 template class FastBackend<float>;

@@ -10,8 +10,8 @@
 namespace kerf::cpu {
 namespace {
 
-using Corners = Numbering::Corners;
-constexpr std::size_t kMostPoints = 0xFFFF;
+using Corners = Draft::Corners;
+constexpr std::int32_t kMostPoints = 0xFFFF;
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
@@ -43,6 +43,12 @@ std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int co
   return out;
 }
 
+/// Names a hanging corner.
+std::uint64_t key_of(const std::array<std::uint16_t, 4>& sorted) {
+  return std::uint64_t{sorted[0]} | std::uint64_t{sorted[1]} << 16 |
+         std::uint64_t{sorted[2]} << 32 | std::uint64_t{sorted[3]} << 48;
+}
+
 /// Cells of a patch in groups. Of each kind those first that make rows of eight, then pairs of rows
 /// of four, then the others by fold.
 class Grouping {
@@ -50,9 +56,7 @@ class Grouping {
   Grouping(const Level& level, Draft& draft, Numbering& numbering)
       : level_(level), draft_(draft), cells_(draft.cells) {
     sort_cells();
-    draft.cells = cells_;
-    numbering.number(draft, corners_, slots_);
-    nothing_ = draft.nothing();
+    number(numbering);
     draft.cells.clear();
     draft.cells.reserve(cells_.size() + cells_.size() / 4);
     draft.corners.reserve(8 * draft.cells.capacity());
@@ -66,6 +70,15 @@ class Grouping {
   }
 
  private:
+  void number(Numbering& numbering) {
+    std::vector<std::int32_t> all = cells_;
+    all.insert(all.end(), draft_.changed.begin(), draft_.changed.end());
+    numbering.number(draft_, all, corners_, slots_);
+    const auto end = static_cast<std::ptrdiff_t>(cells_.size());
+    draft_.changed_corners.assign(corners_.begin() + end, corners_.end());
+    draft_.changed_slots.assign(slots_.begin() + end, slots_.end());
+  }
+
   /// By kind, then by place.
   void sort_cells() {
     std::vector<std::tuple<std::uint16_t, std::uint64_t, std::int32_t>> order(cells_.size());
@@ -117,7 +130,7 @@ class Grouping {
       draft_.kind.push_back(kind);
       draft_.row.push_back(row);
       draft_.folded.push_back(0);
-      draft_.corners.resize(draft_.corners.size() + 8 * kGroup, nothing_);
+      draft_.corners.resize(draft_.corners.size() + 8 * kGroup, kNothing);
     }
     draft_.cells.push_back(cells_[n]);
     index_.push_back(n);
@@ -132,7 +145,7 @@ class Grouping {
     for (std::size_t g = 0; g < draft_.folded.size(); ++g) {
       if (draft_.folded[g] == 0) continue;
       const std::size_t at = draft_.slots.size();
-      draft_.slots.resize(at + 8 * kGroup, nothing_);
+      draft_.slots.resize(at + 8 * kGroup, kNothing);
       for (std::size_t k = 0; k < kGroup; ++k) {
         const std::int32_t c = draft_.cells[kGroup * g + k];
         if (c < 0) continue;
@@ -148,7 +161,6 @@ class Grouping {
   std::vector<std::uint16_t> kind_of_;
   std::vector<Corners> corners_, slots_;
   std::vector<std::size_t> index_;  // per lane, into these
-  std::uint16_t nothing_ = 0;
 };
 
 }  // namespace
@@ -158,62 +170,87 @@ std::uint64_t morton(const Vec3i& c) {
   return at(0) | at(1) << 1 | at(2) << 2;
 }
 
-void Numbering::number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots) {
+void Numbering::number(Draft& draft, std::span<const std::int32_t> cells,
+                       std::vector<Corners>& corners, std::vector<Corners>& slots) {
   places_.clear();
   hanging_.clear();
-  corners.reserve(draft.cells.size());
-  slots.reserve(draft.cells.size());
-  for (const std::int32_t c : draft.cells) {
+  known_.clear();
+  if (!draft.anew) know(patched_.patches[draft.patch]);
+  corners.reserve(cells.size());
+  slots.reserve(cells.size());
+  for (const std::int32_t c : cells) {
     slots.emplace_back();
     for (std::size_t i = 0; i < 8; ++i) slots.back()[i] = vertex(level_.slots[c][i], draft);
   }
-  const std::size_t vertices = draft.vertices.size();
-  for (std::size_t n = 0; n < draft.cells.size(); ++n)
-    corners.push_back(corners_of(draft, n, slots[n]));
-  for (const std::int32_t v : draft.vertices) first_[v] = 0;
-  sort(draft, vertices);
+  for (std::size_t n = 0; n < cells.size(); ++n)
+    corners.push_back(corners_of(draft, cells[n], slots[n]));
+  for (const auto* all : {&draft.vertices, &known_})
+    for (const std::int32_t v : *all) point_[v] = 0;
+  sort(draft);
   for (auto* all : {&corners, &slots})
     for (Corners& of : *all)
-      for (std::uint16_t& point : of) point = rank_[point];
+      for (std::uint16_t& point : of)
+        if (point >= draft.first_point) point = rank_[point - draft.first_point];
+}
+
+/// The points of a patch as it is.
+void Numbering::know(const Patch& patch) {
+  const auto add = [&](std::int32_t v, std::uint16_t point) {
+    if (v < 0) return;
+    point_[v] = point;
+    known_.push_back(v);
+  };
+  for (std::int32_t at = patch.own.first; at < patch.own.end(); ++at)
+    add(patched_.vertex[at], patched_.own_point[at]);
+  for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
+    add(patched_.vertex[patched_.copy_vertex[k]], patched_.copy_point[k]);
+  for (std::int32_t h = patch.hanging.first; h < patch.hanging.end(); ++h) {
+    auto masters = patched_.hanging_masters[h];
+    std::sort(masters.begin(), masters.end());
+    hanging_.emplace(key_of(masters), patched_.hanging_point[h]);
+  }
+}
+
+/// The point that the next new one gets until they are sorted.
+std::int32_t Numbering::next(const Draft& draft) const {
+  const std::int32_t point = draft.first_point + size_of(places_.size());
+  ensures(point < kMostPoints, "a patch has too many points");
+  return point;
 }
 
 std::uint16_t Numbering::vertex(std::int32_t v, Draft& draft) {
-  std::int32_t& first = first_[v];
-  if (first == 0) {
+  std::int32_t& point = point_[v];
+  if (point == kNothing) {
+    point = next(draft);
     draft.vertices.push_back(v);
     places_.push_back(place_key(level_.point[v]));
-    first = size_of(draft.vertices.size());
-    ensures(places_.size() < kMostPoints, "a patch has too many points");
   }
-  return static_cast<std::uint16_t>(first - 1);
+  return static_cast<std::uint16_t>(point);
 }
 
-Corners Numbering::corners_of(Draft& draft, std::size_t n, const Corners& slots) {
-  const std::int32_t cell = draft.cells[n];
+Corners Numbering::corners_of(Draft& draft, std::int32_t cell, const Corners& slots) {
   const kernels::FoldCode fold = level_.fold[cell];
   Corners out = slots;
   if (!kernels::has_hanging(fold)) return out;
   for (int i = 0; i < 8; ++i) {
     if (!kernels::is_hanging(fold, i)) continue;
     const auto masters = masters_of(slots, kernels::fold_octant(fold), i);
-    const std::uint64_t key = std::uint64_t{masters[0]} | std::uint64_t{masters[1]} << 16 |
-                              std::uint64_t{masters[2]} << 32 | std::uint64_t{masters[3]} << 48;
-    const auto [entry, added] = hanging_.try_emplace(key, size_of(places_.size()));
+    const auto [entry, added] = hanging_.try_emplace(key_of(masters), next(draft));
     if (added) {
       Vec3i p = level_.corner[cell];
       for (int d = 0; d < 3; ++d) p[d] += ((i >> d) & 1) << level_.size_log2[cell];
       places_.push_back(place_key(p));
       draft.masters.push_back(masters);
-      ensures(places_.size() < kMostPoints, "a patch has too many points");
     }
     out[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(entry->second);
   }
   return out;
 }
 
-/// From the order in which points were met to that of their places; hanging ones come last of those
-/// of one place.
-void Numbering::sort(Draft& draft, std::size_t vertices) {
+/// New points from the order in which they were met to that of their places; hanging ones come last
+/// of those of one place.
+void Numbering::sort(Draft& draft) {
+  const std::size_t vertices = draft.vertices.size();
   order_.resize(places_.size());
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const std::int32_t v = k < vertices ? draft.vertices[k] : INT32_MAX;
@@ -225,9 +262,9 @@ void Numbering::sort(Draft& draft, std::size_t vertices) {
   sorted.reserve(vertices);
   draft.vertex_point.reserve(vertices);
   draft.hanging_point.resize(draft.masters.size());
-  for (std::size_t rank = 0; rank < order_.size(); ++rank) {
-    const std::size_t k = order_[rank].second & 0xFFFF;
-    rank_[k] = static_cast<std::uint16_t>(rank);
+  for (std::size_t n = 0; n < order_.size(); ++n) {
+    const std::size_t k = order_[n].second & 0xFFFF;
+    rank_[k] = static_cast<std::uint16_t>(static_cast<std::size_t>(draft.first_point) + n);
     if (k < vertices) {
       sorted.push_back(draft.vertices[k]);
       draft.vertex_point.push_back(rank_[k]);
@@ -236,8 +273,21 @@ void Numbering::sort(Draft& draft, std::size_t vertices) {
     }
   }
   draft.vertices = std::move(sorted);
+  draft.new_points = size_of(places_.size());
   for (auto& masters : draft.masters)
-    for (std::uint16_t& m : masters) m = rank_[m];
+    for (std::uint16_t& m : masters)
+      if (m >= draft.first_point) m = rank_[m - draft.first_point];
+}
+
+RowKind row_kind(const std::uint16_t* corners) {
+  bool halves = true, whole = true;
+  for (int i = 0; i < 8; i += 2)
+    for (int k = 0; k < kGroup; ++k) {
+      const std::uint16_t *a = corners + kGroup * i, *b = a + kGroup;
+      halves = halves && b[k] == a[k] + 1 && (k % 4 == 0 || a[k] == b[k - 1]);
+      whole = whole && (k != 4 || a[k] == b[k - 1]);
+    }
+  return !halves ? kScattered : whole ? kRow : kTwoRows;
 }
 
 void make_draft(const Level& level, Draft& draft, Numbering& numbering) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A patch by itself: its cells in groups and its points in order, before they have a place in the
-// arrays of the level.
+// A patch by itself, or what changes in one: cells in groups and points in order, before they have
+// a place in the arrays of the level.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +12,7 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -20,24 +21,36 @@
 
 namespace kerf::cpu {
 
+/// What a patch is made from; or, if it is not to be made anew, what changes in it.
 struct Draft {
+  using Corners = std::array<std::uint16_t, 8>;
+
   std::int32_t patch = 0;
-  std::vector<std::int32_t> cells;          // to be grouped; then per lane, -1: none
-  std::vector<std::uint16_t> kind_of;       // of the cells to be grouped
-  std::vector<std::uint16_t> corners;       // [group][8][8]
-  std::vector<std::uint16_t> slots;         // the same, of the groups that are folded
-  std::vector<std::uint8_t> folded;         // per group
-  std::vector<std::uint8_t> row;            // per group
-  std::vector<std::uint16_t> kind;          // per group
-  std::vector<std::int32_t> vertices;       // of the level, in the order of their points
-  std::vector<std::uint16_t> vertex_point;  // rising
+  bool anew = true;
+  std::int32_t first_point = 1, new_points = 0;  // 0 is kNothing
+  std::vector<std::int32_t> cells;               // to be grouped; then per lane, -1: none
+  std::vector<std::uint16_t> kind_of;            // of the cells to be grouped
+  std::vector<std::uint16_t> corners;            // [group][8][8]
+  std::vector<std::uint16_t> slots;              // the same, of the groups that are folded
+  std::vector<std::uint8_t> folded;              // per group
+  std::vector<std::uint8_t> row;                 // per group
+  std::vector<std::uint16_t> kind;               // per group
+  std::vector<std::int32_t> vertices;            // of the level, that come to the patch
+  std::vector<std::uint16_t> vertex_point;       // rising, but for those that were there before
   std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> masters;
 
-  std::int32_t points() const {
-    return static_cast<std::int32_t>(vertices.size() + masters.size()) + 1;
-  }
-  std::uint16_t nothing() const { return static_cast<std::uint16_t>(points() - 1); }
+  // Of a patch that stays.
+  std::vector<std::int32_t> changed;  // cells that stay where they are, with other corners or slots
+  std::vector<Corners> changed_corners, changed_slots;  // points
+  std::vector<std::int32_t> refilled;                   // cells that stay, with other children
+  std::vector<std::int32_t> lost;                       // ascending: vertices that leave the patch
+  std::size_t folding = 0;  // groups that have a folded cell now, and had none
+  Patch before;             // its ranges as they were
+
+  std::int32_t points() const { return first_point + new_points; }
+  /// Whether cells get other lanes.
+  bool moves_cells() const { return anew || !cells.empty(); }
 };
 
 /// Zeros, one for each of many numbers; of large bodies, those never touched cost nothing.
@@ -87,28 +100,38 @@ void for_patches(std::int32_t begin, std::int32_t end, int threads, const Make& 
 /// The points of one patch after the other.
 class Numbering {
  public:
-  using Corners = std::array<std::uint16_t, 8>;
+  using Corners = Draft::Corners;
 
-  explicit Numbering(const Level& level) : level_(level), first_(level.point.size()) {}
+  explicit Numbering(const PatchedLevel& patched)
+      : patched_(patched), level_(*patched.level), point_(level_.point.size()) {}
 
-  /// Corners and slots of the draft's cells, as points.
-  void number(Draft& draft, std::vector<Corners>& corners, std::vector<Corners>& slots);
+  /// Corners and slots of some cells, as points. Those that the patch has, if it stays, or else
+  /// new ones, which the draft gets.
+  void number(Draft& draft, std::span<const std::int32_t> cells, std::vector<Corners>& corners,
+              std::vector<Corners>& slots);
 
  private:
+  void know(const Patch& patch);
   std::uint16_t vertex(std::int32_t v, Draft& draft);
-  Corners corners_of(Draft& draft, std::size_t n, const Corners& slots);
-  void sort(Draft& draft, std::size_t vertices);
+  Corners corners_of(Draft& draft, std::int32_t cell, const Corners& slots);
+  std::int32_t next(const Draft& draft) const;
+  void sort(Draft& draft);
 
+  const PatchedLevel& patched_;
   const Level& level_;
-  Marks first_;                        // per vertex of the level: its place in the draft, from 1
-  std::vector<std::uint64_t> places_;  // of points as they were met: vertices, then hanging ones
+  Marks point_;                        // per vertex of the level: its point, 0: none yet
+  std::vector<std::int32_t> known_;    // vertices that the patch has
+  std::vector<std::uint64_t> places_;  // of new points as they were met: vertices, hanging ones
   std::vector<std::pair<std::uint64_t, std::uint64_t>> order_;
-  std::vector<std::uint16_t> rank_;
+  std::vector<std::uint16_t> rank_;  // of new points
   std::unordered_map<std::uint64_t, std::int32_t> hanging_;
 };
 
 /// Groups and numbers the cells of a draft.
 void make_draft(const Level& level, Draft& draft, Numbering& numbering);
+
+/// How the points of a group lie: [8][8] of corners.
+RowKind row_kind(const std::uint16_t* corners);
 
 /// A number along a curve that stays within cubes.
 std::uint64_t morton(const Vec3i& point);

@@ -164,7 +164,7 @@ class PatchPoints {
       to[3] = 0;
     }
     interpolate_hanging();
-    std::fill_n(x_ + 4 * std::size_t(patch_.points - 1), 4, S(0));
+    std::fill_n(x_ + 4 * std::size_t(kNothing), 4, S(0));
     std::fill_n(y_, 4 * std::size_t(patch_.points), S(0));
   }
 

@@ -92,30 +92,32 @@ FirstCells::FirstCells(const Level& level) : level_(level) {
 TransferRows::TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first)
     : level_(level), next_(next), first_(first), local_(next.point.size()) {
   for (int place = 0; place <= kernels::kPassed; ++place)
-    regular_[static_cast<std::size_t>(place)] = [&] {
-      float w[8][8];
-      kernels::transfer_weights(kernels::FoldCode{0}, place, kernels::FoldCode{0}, w);
-      Weights out;
-      for (std::size_t i = 0; i < 8; ++i)
-        for (std::size_t m = 0; m < 8; ++m) out[i][m] = static_cast<std::uint8_t>(kUnit * w[i][m]);
-      return out;
-    }();
+    regular_[static_cast<std::size_t>(place)] =
+        terms_of(kernels::FoldCode{0}, place, kernels::FoldCode{0});
 }
 
-const TransferRows::Weights& TransferRows::weights(std::uint16_t child, int place,
+TransferRows::SlotTerms TransferRows::terms_of(std::uint16_t child, int place,
+                                               std::uint16_t parent) {
+  float w[8][8];
+  kernels::transfer_weights(child, place, parent, w);
+  SlotTerms out{};
+  for (std::size_t i = 0; i < 8; ++i)
+    for (std::size_t m = 0; m < 8; ++m)
+      if (const auto weight = static_cast<std::uint8_t>(kUnit * w[i][m]); weight != 0) {
+        out[i].slot[out[i].count] = static_cast<std::uint8_t>(m);
+        out[i].weight[out[i].count++] = weight;
+      }
+  return out;
+}
+
+const TransferRows::SlotTerms& TransferRows::terms(std::uint16_t child, int place,
                                                    std::uint16_t parent) {
   if (!kernels::has_hanging(child) && !kernels::has_hanging(parent))
     return regular_[static_cast<std::size_t>(place)];
   const std::uint64_t key = std::uint64_t{child} | std::uint64_t{parent} << 16 |
                             std::uint64_t(static_cast<unsigned>(place)) << 32;
   const auto [entry, added] = others_.try_emplace(key);
-  if (added) {
-    float w[8][8];
-    kernels::transfer_weights(child, place, parent, w);
-    for (std::size_t i = 0; i < 8; ++i)
-      for (std::size_t m = 0; m < 8; ++m)
-        entry->second[i][m] = static_cast<std::uint8_t>(kUnit * w[i][m]);
-  }
+  if (added) entry->second = terms_of(child, place, parent);
   return entry->second;
 }
 
@@ -123,27 +125,29 @@ std::uint8_t TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
   const Level& level = *level_.level;
   const std::int32_t first = first_[vertex];
   const std::int32_t child = first / 8, parent = level.parent[child];
-  const auto& w = weights(level.fold[child], level.place[child],
-                          next_.fold[parent])[static_cast<std::size_t>(first % 8)];
-  std::uint8_t terms = 0;
-  for (std::size_t m = 0; m < 8; ++m) {
-    if (w[m] == 0) continue;
-    const std::int32_t taken = next_.slots[parent][m];
+  const RowTerms& row = terms(level.fold[child], level.place[child],
+                              next_.fold[parent])[static_cast<std::size_t>(first % 8)];
+  const auto& slots = next_.slots[parent];
+  for (std::size_t k = 0; k < row.count; ++k) {
+    const std::int32_t taken = slots[row.slot[k]];
     std::int32_t& point = local_[taken];
     if (point == 0) {
       out.points.push_back(taken);
       point = size_of(out.points.size());
     }
     out.term_point.push_back(static_cast<std::uint16_t>(point - 1));
-    out.term_weight.push_back(w[m]);
-    ++terms;
+    out.term_weight.push_back(row.weight[k]);
   }
-  return terms;
+  return row.count;
 }
 
 TransferDraft TransferRows::operator()(std::int32_t n) {
   const Patch& patch = level_.patches[n];
   TransferDraft out;
+  const auto vertices = static_cast<std::size_t>(patch.own.size + patch.copies.size);
+  out.term_point.reserve(4 * vertices);
+  out.term_weight.reserve(4 * vertices);
+  out.terms.reserve(static_cast<std::size_t>(patch.own.size));
   for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v) {
     if (v % kGroup == 0) out.first_term.push_back(size_of(out.term_point.size()));
     out.terms.push_back(level_.vertex[v] < 0 ? std::uint8_t{0} : add_row(level_.vertex[v], out));

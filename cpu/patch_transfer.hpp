@@ -49,17 +49,22 @@ class TransferRows {
   TransferDraft operator()(std::int32_t patch);
 
  private:
-  using Weights = std::array<std::array<std::uint8_t, 8>, 8>;  // slots of a child and its parent
+  /// What a vertex takes: slots of a parent, and weights.
+  struct RowTerms {
+    std::uint8_t count = 0, slot[8] = {}, weight[8] = {};
+  };
+  using SlotTerms = std::array<RowTerms, 8>;  // per slot of a child
 
-  const Weights& weights(std::uint16_t child, int place, std::uint16_t parent);
+  static SlotTerms terms_of(std::uint16_t child, int place, std::uint16_t parent);
+  const SlotTerms& terms(std::uint16_t child, int place, std::uint16_t parent);
   std::uint8_t add_row(std::int32_t vertex, TransferDraft& out);
 
   const PatchedLevel& level_;
   const Level& next_;
   const FirstCells& first_;
   Marks local_;  // per vertex of the next level: its point, from 1
-  std::array<Weights, 9> regular_;
-  std::unordered_map<std::uint64_t, Weights> others_;
+  std::array<SlotTerms, 9> regular_;
+  std::unordered_map<std::uint64_t, SlotTerms> others_;
 };
 
 /// Makes the parts of some patches, in ascending order, and all that they need.

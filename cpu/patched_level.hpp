@@ -8,13 +8,16 @@
 // alone, or
 //           shared ones; one that was shared stays so. Vectors are [tile][component][8]. What is
 //           left of a tile is nothing, which is zero and stays so.
-// Points    of a patch: its vertices, its hanging corners, and last one that is nothing. A hanging
-//           corner is the mean of four of the points (each of two counts twice on an edge).
+// Points    of a patch: first one that is nothing, then its vertices and its hanging corners by
+//           place, then those that came with cuts. A hanging corner is the mean of four of the
+//           points (each of two counts twice on an edge).
 // Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
 //           nothing for corners. The cells of a group are of one kind.
 //
-// Cuts and hanging corners need nothing beyond the numbers of points. After a cut, patches that it
-// touched are made again where they were, or at the end of the arrays if they need more room.
+// Cuts and hanging corners need nothing beyond the numbers of points. After a cut, cells that have
+// other corners get other points where they are, new ones come in groups at the end of their patch,
+// and a patch that needs more room moves to the end of the arrays. One in which much has changed is
+// made again.
 #pragma once
 
 #include <array>
@@ -31,6 +34,8 @@ namespace kerf::cpu {
 
 inline constexpr int kGroup = 8;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
+/// The point of every patch that is nothing: zero, and never read.
+inline constexpr std::uint16_t kNothing = 0;
 
 /// How the matrix of a cell of a stored level comes about; cells of a group are alike.
 enum StoredKind : std::uint16_t {
@@ -63,6 +68,8 @@ struct Range {
   std::int32_t end() const { return first + size; }
   /// Room for `count` entries, at the `end` of the array where there is too little.
   void fit(std::size_t count, std::int32_t& end);
+  /// The same for so many more; with some to `spare` when it is made.
+  void grow(std::size_t count, bool spare, std::int32_t& end);
 };
 
 /// What cells of level 0 have in common.

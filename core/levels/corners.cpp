@@ -2,7 +2,6 @@
 #include "core/levels/corners.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/base/error.hpp"
@@ -64,6 +63,24 @@ std::vector<double> NewVertices::combine(std::span<const double> of_sources) con
   return out;
 }
 
+// Most cells lie far off beyond one side, so that is looked at first.
+bool may_meet_opened(const Vec3d (&vertices)[8], const BladeReach& reach) {
+  Box3 box;
+  for (const Vec3d& at : vertices) box.add(at);
+  for (int d = 0; d < 3; ++d) {
+    const double beyond = BladeReach::kBeyond * (box.hi[d] - box.lo[d]);
+    if (box.hi[d] + beyond < reach.box().lo[d] || box.lo[d] - beyond > reach.box().hi[d])
+      return false;
+  }
+  return reach.may_meet(box, true);
+}
+
+void add_opened(std::span<const std::int32_t> opened, NearCells& out) {
+  out.cells.insert(out.cells.end(), opened.begin(), opened.end());
+  std::sort(out.cells.begin(), out.cells.end());
+  out.cells.erase(std::unique(out.cells.begin(), out.cells.end()), out.cells.end());
+}
+
 FindNear::FindNear(const Hierarchy& hierarchy, std::span<const double> displacement,
                    const BladeReach& reach)
     : level_(hierarchy.levels[0]),
@@ -104,21 +121,6 @@ void FindNear::look_at_vertices(std::int32_t first, std::int32_t last, NearCells
   out.finite = out.finite && std::isfinite(sum);
 }
 
-// Whether links of a cell whose vertices all lie beyond one side of the box end there too.
-bool FindNear::is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const {
-  const int side = std::countr_zero(beside), d = side / 2;
-  Box3 along;
-  for (const std::int32_t v : slots) {
-    const double x = level_.point[v][static_cast<std::size_t>(d)] * spacing_ +
-                     displacement_[3 * static_cast<std::size_t>(v) + static_cast<std::size_t>(d)];
-    along.lo.x = std::min(along.lo.x, x);
-    along.hi.x = std::max(along.hi.x, x);
-  }
-  const double beyond = BladeReach::kBeyond * (along.hi.x - along.lo.x);
-  return side % 2 == 0 ? along.hi.x + beyond < reach_.box().lo[d]
-                       : along.lo.x - beyond > reach_.box().hi[d];
-}
-
 // The sides of the box beyond which all vertices of a cell lie.
 std::uint8_t FindNear::sides_beyond(std::int32_t cell) const {
   std::uint8_t beside = 255;
@@ -136,17 +138,13 @@ void FindNear::look_at_cells(std::int32_t first, std::int32_t last, NearCells& o
 }
 
 void FindNear::look_at_opened(std::span<const std::int32_t> cells, NearCells& out) const {
-  const std::size_t found = out.cells.size();
+  std::vector<std::int32_t> met;
   for (const std::int32_t c : cells) {
-    const std::uint8_t beside = sides_beyond(c);
-    if (beside != 0 && is_far(level_.slots[c], beside)) continue;
-    Box3 box;
-    for (const std::int32_t v : level_.slots[c]) box.add(position(v));
-    if (reach_.may_meet(box, true)) out.cells.push_back(c);
+    Vec3d at[8];
+    for (std::size_t i = 0; i < 8; ++i) at[i] = position(level_.slots[c][i]);
+    if (may_meet_opened(at, reach_)) met.push_back(c);
   }
-  if (out.cells.size() == found) return;
-  std::sort(out.cells.begin(), out.cells.end());
-  out.cells.erase(std::unique(out.cells.begin(), out.cells.end()), out.cells.end());
+  add_opened(met, out);
 }
 
 NearCells near_cells(const Hierarchy& hierarchy, std::span<const double> displacement,

@@ -36,6 +36,11 @@ struct NearCells {
   bool finite = true;               ///< whether all positions are
   std::vector<std::int32_t> cells;  ///< ascending: all that may be met, and few others
 };
+/// Of a cell that has cut links, whose eight vertices are deformed to these places.
+bool may_meet_opened(const Vec3d (&vertices)[8], const BladeReach& reach);
+/// Joins them to the cells, which come in any order.
+void add_opened(std::span<const std::int32_t> opened, NearCells& out);
+
 /// In two passes, each of which may be shared out: over vertices, then over cells; and, apart from
 /// both, over those few whose links to other cells were cut, since these may reach beyond the cell.
 class FindNear {
@@ -50,7 +55,6 @@ class FindNear {
  private:
   Vec3d position(std::int32_t vertex) const;
   std::uint8_t sides_beyond(std::int32_t cell) const;
-  bool is_far(const std::array<std::int32_t, 8>& slots, std::uint8_t beside) const;
 
   const Level& level_;
   double spacing_;

@@ -5,6 +5,7 @@
 // test_operators.cpp, against the oracle.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -267,7 +268,23 @@ std::vector<Vector> results_of(const Problem& p, Backend& backend) {
   return out;
 }
 
-// Patches that a cut touched are made again, in place or elsewhere; vectors and rotations move.
+void expect_same_near(const Problem& p, const Backend& fast, int vector,
+                      const TriangleMesh& blade) {
+  const Vector at = p.deformation();
+  std::vector<std::int32_t> opened = opened_cells(p.body);
+  std::sort(opened.begin(), opened.end());
+  const BladeReach reach(blade, p.body.lattice().origin);
+  const NearCells expected = near_cells(p.hierarchy, test::span_of(at), reach, opened),
+                  found = fast.find_near(vector, reach, opened);
+  EXPECT_EQ(found.cells, expected.cells);
+  EXPECT_EQ(found.finite, expected.finite);
+  for (int d = 0; d < 3; ++d) {
+    EXPECT_EQ(found.bounds.lo[d], expected.bounds.lo[d]);
+    EXPECT_EQ(found.bounds.hi[d], expected.bounds.hi[d]);
+  }
+}
+
+// A cut changes patches in place, or makes them again elsewhere; vectors and rotations move.
 TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
   constexpr double kDouble = 1e-12;
   for (const int refinement : {0, 1, 2}) {
@@ -293,7 +310,9 @@ TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
       std::vector<double> rotation(4 * p.hierarchy.values.size());
       fast->read_rotations(rotation);
 
-      ASSERT_TRUE(p.update(updater, cut(p.body, {}, random.next(), i + 1)));
+      const TriangleMesh blade = random.next();
+      expect_same_near(p, *fast, work, blade);
+      ASSERT_TRUE(p.update(updater, cut(p.body, {}, blade, i + 1)));
       const LevelChange& change = updater.change().levels[0];
       fast->update(p.hierarchy, updater.change());
 

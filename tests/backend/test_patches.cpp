@@ -137,7 +137,24 @@ class Followed {
 };
 
 struct Counts {
-  int updates = 0, remade = 0, untouched = 0, divided = 0;
+  int updates = 0, remade = 0, untouched = 0, divided = 0, changed = 0, added = 0;
+
+  /// Cells that stayed where they were, with other vertices or as they were; and new ones in
+  /// patches most of whose cells stayed.
+  void count(const PatchedLevel& before, const PatchedLevel& now, const LevelChange& change) {
+    std::vector<int> stayed(before.patches.size());
+    for (std::size_t c = 0; c < before.lane.size(); ++c) {
+      const bool same = before.lane[c] == now.lane[c];
+      untouched += same;
+      stayed[std::size_t(before.patch_of_cell(int(c)))] += same ? 1 : -1;
+    }
+    for (std::size_t i = 0; i < change.before.size(); ++i)
+      changed += before.lane[change.cells[i]] == now.lane[change.cells[i]] &&
+                 change.before[i].slots != now.level->slots[change.cells[i]];
+    for (std::int32_t c = change.cells_before; c < now.level->cells(); ++c)
+      if (const auto p = std::size_t(now.patch_of_cell(c)); p < stayed.size())
+        added += stayed[p] > 0;
+  }
 };
 
 /// A few old vertices that lie together.
@@ -171,7 +188,7 @@ void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& coun
     ASSERT_TRUE(p.update(updater, event, turned));
     const std::size_t patches = one.levels()[0].patches.size();
     const int remade = one.remade();
-    const std::vector<std::int32_t> lanes = one.levels()[0].lane;
+    const std::vector<PatchedLevel> before = one.levels();
     one.update(updater.change());
     two.update(updater.change());
     test::expect_whole(one.levels());
@@ -184,8 +201,8 @@ void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& coun
     }
     ++counts.updates;
     counts.divided += one.remade() == remade && one.levels()[0].patches.size() > patches;
-    for (std::size_t c = 0; c < lanes.size(); ++c)
-      counts.untouched += lanes[c] == one.levels()[0].lane[c];
+    for (std::size_t l = 0; l < before.size(); ++l)
+      counts.count(before[l], one.levels()[l], updater.change().levels[l]);
   }
   counts.remade += one.remade();
 }
@@ -198,6 +215,8 @@ TEST(Patches, StayWholeUnderCuts) {
   EXPECT_GT(counts.remade, 0);
   EXPECT_GT(counts.divided, 0);
   EXPECT_GT(counts.untouched, 1000);
+  EXPECT_GT(counts.changed, 1000);
+  EXPECT_GT(counts.added, 1000);
 }
 
 /// A level with cell matrices of noise, and `diagonal` on their diagonal; zero where held.
