@@ -187,15 +187,13 @@ void FastBackend<S>::rotate_cells(int displacement) {
   settle();
   const PatchedLevel& l = levels_[0].patched;
   const double* u = levels_[0].vectors[displacement].exact.data();
-  const auto patches = static_cast<std::int32_t>(l.patches.size());
-#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) if (patches > 1)
-  for (std::int32_t p = 0; p < patches; ++p) {
+  for_patches(0, static_cast<std::int32_t>(l.patches.size()), threads_, [&](std::int32_t p) {
     const Patch& patch = l.patches[p];
     PatchPoints<double> points(l, patch);
     points.load([&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u);
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
       rotate_group(l, exact_, static_cast<std::size_t>(g), points.x());
-  }
+  });
   round_rotations();
 }
 
@@ -426,9 +424,7 @@ void FastBackend<S>::prepare(int level) {
   const std::size_t copies = packed.copy_point.size();
   S* const upper = partial_sums<S>(8 * copies);
   S* const lower = upper + 4 * copies;
-  const auto patches = static_cast<std::int32_t>(packed.patches.size());
-#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) if (patches > 1)
-  for (std::int32_t p = 0; p < patches; ++p) {
+  for_patches(0, static_cast<std::int32_t>(packed.patches.size()), threads_, [&](std::int32_t p) {
     const Patch& patch = packed.patches[p];
     thread_local PointBuffer<S> buffer;
     const std::size_t scalars = 4 * static_cast<std::size_t>(patch.points);
@@ -448,7 +444,7 @@ void FastBackend<S>::prepare(int level) {
       std::copy_n(to.upper + 4 * std::size_t(packed.copy_point[k]), 4, upper + 4 * std::size_t(k));
       std::copy_n(to.lower + 4 * std::size_t(packed.copy_point[k]), 4, lower + 4 * std::size_t(k));
     }
-  }
+  });
   parallel(static_cast<std::int32_t>(packed.shared_tiles.size()), kWorthTiles, [&](std::int32_t n) {
     for_packs<S>([&](int first) {
       invert_tile(l, static_cast<std::size_t>(packed.shared_tiles[n]), first,

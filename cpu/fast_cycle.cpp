@@ -157,11 +157,13 @@ void FastBackend<S>::restrict_residual(int fine) {
   S* f = to.at(kRight);
   S* const given = partial_sums<S>(4 * transfer.point.size());
   const auto patches = static_cast<std::int32_t>(from.patched.patches.size());
+  ParallelErrors errors;
 #pragma omp parallel num_threads(threads_) if (from.patched.cell.size() >= kWorthCells)
   {
 #pragma omp for schedule(dynamic, 1)
     for (std::int32_t p = 0; p < patches; ++p)
-      TransferPoints<S>(from.patched, static_cast<std::size_t>(p)).give(r, given);
+      errors.run(
+          [&] { TransferPoints<S>(from.patched, static_cast<std::size_t>(p)).give(r, given); });
 #pragma omp for schedule(static)
     for (std::int32_t t = 0; t < to.tiles(); ++t) {
       const auto tile = static_cast<std::size_t>(t);
@@ -176,6 +178,7 @@ void FastBackend<S>::restrict_residual(int fine) {
       });
     }
   }
+  errors.rethrow();
   zero(fine + 1, kSolution);
 }
 
@@ -184,16 +187,14 @@ template <class S>
 void FastBackend<S>::correct_shared(int level) {
   FastLevel<S>& l = levels_[level];
   FastLevel<S>& next = levels_[level + 1];
-  const auto patches = static_cast<std::int32_t>(l.patched.patches.size());
   const S* from = next.at(kSolution);
   S* to = l.at(kSolution);
-#pragma omp parallel for num_threads(threads_) \
-    schedule(dynamic, 1) if (l.patched.cell.size() >= kWorthCells)
-  for (std::int32_t p = 0; p < patches; ++p) {
+  const int threads = l.patched.cell.size() >= kWorthCells ? threads_ : 1;
+  for_patches(0, static_cast<std::int32_t>(l.patched.patches.size()), threads, [&](std::int32_t p) {
     TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
     points.load(next.patched, from);
     points.add_to_leads(to);
-  }
+  });
 }
 
 /// The correction waits for the sweep that reads the solution next.
@@ -213,19 +214,20 @@ void FastBackend<S>::settle() {
   waiting_ = -1;
   const S* from = next.at(kSolution);
   S* u = l.at(kSolution);
-  parallel(static_cast<std::int32_t>(l.patched.patches.size()), 2, [&](std::int32_t p) {
-    TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
-    points.load(next.patched, from);
-    const Range& own = l.patched.patches[p].own;
-    for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
-      const auto tile = static_cast<std::size_t>(t);
-      for_packs<S>([&](int first) {
-        store_tile(u, tile, first,
-                   load_tile(static_cast<const S*>(u), tile, first) +
-                       masked(points.taken(tile, first), l.fixed(tile, first)));
-      });
-    }
-  });
+  for_patches(0, static_cast<std::int32_t>(l.patched.patches.size()), threads_,
+              [&](std::int32_t p) {
+                TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
+                points.load(next.patched, from);
+                const Range& own = l.patched.patches[p].own;
+                for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
+                  const auto tile = static_cast<std::size_t>(t);
+                  for_packs<S>([&](int first) {
+                    store_tile(u, tile, first,
+                               load_tile(static_cast<const S*>(u), tile, first) +
+                                   masked(points.taken(tile, first), l.fixed(tile, first)));
+                  });
+                }
+              });
 }
 
 template <class S>

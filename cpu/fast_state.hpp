@@ -19,6 +19,7 @@
 #include "cpu/fast_kernels.hpp"
 #include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
+#include "cpu/parallel_errors.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/transfer_points.hpp"
 
@@ -331,21 +332,23 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
   const auto patches = static_cast<std::int32_t>(l.patches.size());
   const auto shared = static_cast<std::int32_t>(l.shared_tiles.size());
   T* const partial = partial_sums<T>(4 * l.copy_point.size());
+  ParallelErrors errors;
   std::vector<Sums> sums(l.patches.size() + l.shared_tiles.size());
 #pragma omp parallel num_threads(threads_) if (l.cell.size() >= kWorthCells)
   {
 #pragma omp for schedule(static)
     for (std::int32_t n = 0; n < shared; ++n) before(static_cast<std::size_t>(l.shared_tiles[n]));
 #pragma omp for schedule(dynamic, 1)
-    for (std::int32_t p = 0; p < patches; ++p) {
-      const Patch& patch = l.patches[p];
-      PatchPoints<T> points(l, patch);
-      start(static_cast<std::size_t>(p));
-      points.load(own, u);
-      for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
-        cells(static_cast<std::size_t>(g), points.x(), points.y());
-      sums[p] = points.store(finish, partial);
-    }
+    for (std::int32_t p = 0; p < patches; ++p)
+      errors.run([&] {
+        const Patch& patch = l.patches[p];
+        PatchPoints<T> points(l, patch);
+        start(static_cast<std::size_t>(p));
+        points.load(own, u);
+        for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
+          cells(static_cast<std::size_t>(g), points.x(), points.y());
+        sums[p] = points.store(finish, partial);
+      });
 #pragma omp for schedule(static)
     for (std::int32_t n = 0; n < shared; ++n) {
       const auto tile = static_cast<std::size_t>(l.shared_tiles[n]);
@@ -357,6 +360,7 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
       sums[l.patches.size() + static_cast<std::size_t>(n)] = sum;
     }
   }
+  errors.rethrow();
   Sums sum;
   for (const Sums& one : sums) sum += one;
   return sum;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "cpu/parallel_errors.hpp"
+
 namespace kerf::cpu {
 namespace {
 
@@ -13,9 +15,11 @@ void in_chunks(std::int32_t count, int threads, const Look& look, NearCells& out
   constexpr std::int32_t kChunk = 8192;
   const std::int32_t chunks = (count + kChunk - 1) / kChunk;
   std::vector<NearCells> found(static_cast<std::size_t>(chunks));
+  ParallelErrors errors;
 #pragma omp parallel for num_threads(threads) schedule(static) if (chunks > 1)
   for (std::int32_t i = 0; i < chunks; ++i)
-    look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]);
+    errors.run([&] { look(kChunk * i, std::min(count, kChunk * (i + 1)), found[i]); });
+  errors.rethrow();
   for (const NearCells& part : found) {
     out.finite = out.finite && part.finite;
     out.bounds.add(part.bounds);

@@ -6,10 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <cstdlib>
-#include <exception>
 #include <memory>
 #include <new>
 #include <span>
@@ -17,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "cpu/parallel_errors.hpp"
 #include "cpu/patched_level.hpp"
 
 namespace kerf::cpu {
@@ -70,31 +69,23 @@ class Marks {
 };
 
 /// Runs body(i, local) for i from begin to end on some threads, each with a `local` of its own that
-/// make() gives. What they throw, one of them at least, is thrown here.
+/// make() gives.
 template <class Make, class Body>
 void for_patches(std::int32_t begin, std::int32_t end, int threads, const Make& make,
                  const Body& body) {
-  std::exception_ptr error;
-  std::atomic<bool> failed = false;
-  const auto guarded = [&](const auto& part) {
-    try {
-      part();
-    } catch (...) {
-      if (!failed.exchange(true)) error = std::current_exception();
-    }
-  };
   if (begin >= end) return;
+  ParallelErrors errors;
 #pragma omp parallel num_threads(std::min(threads, end - begin)) if (end - begin > 1)
   {
     decltype(make()) local{};
-    guarded([&] { local = make(); });
+    errors.run([&] { local = make(); });
 #pragma omp for schedule(dynamic, 1)
     for (std::int32_t i = begin; i < end; ++i)
-      guarded([&] {
+      errors.run([&] {
         if (local) body(i, *local);
       });
   }
-  if (error) std::rethrow_exception(error);
+  errors.rethrow();
 }
 
 /// The points of one patch after the other.

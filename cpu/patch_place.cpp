@@ -32,13 +32,12 @@ void PatchPlacer::place(std::vector<Draft>& drafts, const std::vector<std::int32
   for (const Draft& draft : drafts) place_own(draft);
   set_fixed();
   fit_ranges();
-  const std::int32_t count = size_of(drafts.size());
-#pragma omp parallel for num_threads(threads_) schedule(static) if (count > 1)
-  for (std::int32_t i = 0; i < count; ++i)
+  for_patches(0, size_of(drafts.size()), threads_, [&](std::int32_t i) {
     if (drafts[i].anew)
       write_anew(drafts[i]);
     else
       PatchEdit(level_, drafts[i], out_).write();
+  });
   for (const Draft& draft : drafts)
     if (draft.moves_cells()) moves.groups.push_back(out_.patches[draft.patch].groups);
   list_copies();

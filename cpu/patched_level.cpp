@@ -416,12 +416,8 @@ PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change,
 }  // namespace
 
 void Range::fit(std::size_t count, std::int32_t& end) {
-  size = size_of(count);
-  if (size <= room) return;
-  const std::int32_t more = room == 0 ? size : size + size / 4;
-  first = end;
-  room = more;
-  end += more;
+  size = 0;
+  grow(count, true, end);
 }
 
 void Range::grow(std::size_t count, bool spare, std::int32_t& end) {

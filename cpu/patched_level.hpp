@@ -66,9 +66,10 @@ struct Range {
   std::int32_t first = 0, size = 0, room = 0;
 
   std::int32_t end() const { return first + size; }
-  /// Room for `count` entries, at the `end` of the array where there is too little.
+  /// Room for `count` entries, at the `end` of the array where there is too little, and then some to
+  /// spare.
   void fit(std::size_t count, std::int32_t& end);
-  /// The same for so many more; with some to `spare` when it is made.
+  /// The same for so many more; when it is made, some to spare only if asked for.
   void grow(std::size_t count, bool spare, std::int32_t& end);
 };
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+//
+// Exceptions out of parallel regions, which must not leave them by themselves.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+
+namespace kerf::cpu {
+
+/// Keeps what the first of some parts threw, on whatever thread.
+class ParallelErrors {
+ public:
+  template <class Part>
+  void run(const Part& part) noexcept {
+    try {
+      part();
+    } catch (...) {
+      if (!failed_.exchange(true)) error_ = std::current_exception();
+    }
+  }
+  /// After the region: throws it, if there is one.
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  std::atomic<bool> failed_ = false;
+  std::exception_ptr error_;
+};
+
+/// Runs body(i) for i from begin to end on some threads. What they throw, one of them at least, is
+/// thrown here.
+template <class Body>
+void for_patches(std::int32_t begin, std::int32_t end, int threads, const Body& body) {
+  ParallelErrors errors;
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 1) if (end - begin > 1)
+  for (std::int32_t i = begin; i < end; ++i) errors.run([&] { body(i); });
+  errors.rethrow();
+}
+
+}  // namespace kerf::cpu
