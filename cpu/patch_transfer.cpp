@@ -33,19 +33,23 @@ void list_givers(std::size_t vertices, Transfer& t) {
 void transpose(TransferDraft& draft) {
   draft.point_terms.assign(draft.points.size(), 0);
   for (const std::uint16_t point : draft.term_point) ++draft.point_terms[point];
-  std::vector<std::size_t> next(draft.points.size());
-  std::exclusive_scan(draft.point_terms.begin(), draft.point_terms.end(), next.begin(),
-                      std::size_t{0});
+  std::vector<std::uint32_t> next(draft.points.size());
+  std::exclusive_scan(draft.point_terms.begin(), draft.point_terms.end(), next.begin(), 0U);
   draft.given_row.resize(draft.term_point.size());
   draft.given_weight.resize(draft.term_point.size());
-  std::size_t term = 0;
+  // Through pointers of their own, because a byte that is written might be any of theirs.
+  const std::uint16_t* point = draft.term_point.data();
+  const std::uint8_t* weight = draft.term_weight.data();
+  std::uint32_t* const at = next.data();
+  std::uint16_t* const given_row = draft.given_row.data();
+  std::uint8_t* const given_weight = draft.given_weight.data();
   std::uint16_t row = 0;
   for (const auto* terms : {&draft.terms, &draft.lead_terms})
     for (const std::uint8_t count : *terms) {
-      for (const std::size_t end = term + count; term < end; ++term) {
-        const std::size_t at = next[draft.term_point[term]]++;
-        draft.given_row[at] = row;
-        draft.given_weight[at] = draft.term_weight[term];
+      for (const std::uint16_t* const end = point + count; point < end; ++point, ++weight) {
+        const std::uint32_t to = at[*point]++;
+        given_row[to] = row;
+        given_weight[to] = *weight;
       }
       ++row;
     }
@@ -128,6 +132,8 @@ std::uint8_t TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
   const RowTerms& row = terms(level.fold[child], level.place[child],
                               next_.fold[parent])[static_cast<std::size_t>(first % 8)];
   const auto& slots = next_.slots[parent];
+  std::uint16_t* const points = points_.data() + count_;
+  std::uint8_t* const weights = weights_.data() + count_;
   for (std::size_t k = 0; k < row.count; ++k) {
     const std::int32_t taken = slots[row.slot[k]];
     std::int32_t& point = local_[taken];
@@ -135,24 +141,25 @@ std::uint8_t TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
       out.points.push_back(taken);
       point = size_of(out.points.size());
     }
-    out.term_point.push_back(static_cast<std::uint16_t>(point - 1));
-    out.term_weight.push_back(row.weight[k]);
+    points[k] = static_cast<std::uint16_t>(point - 1);
+    weights[k] = row.weight[k];
   }
+  count_ += row.count;
   return row.count;
 }
 
 TransferDraft TransferRows::operator()(std::int32_t n) {
   const Patch& patch = level_.patches[n];
   TransferDraft out;
-  const auto vertices = static_cast<std::size_t>(patch.own.size + patch.copies.size);
-  out.term_point.reserve(4 * vertices);
-  out.term_weight.reserve(4 * vertices);
+  const auto most = 8 * static_cast<std::size_t>(patch.own.size + patch.copies.size);
+  if (points_.size() < most) points_.resize(most), weights_.resize(most);
+  count_ = 0;
   out.terms.reserve(static_cast<std::size_t>(patch.own.size));
   for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v) {
-    if (v % kGroup == 0) out.first_term.push_back(size_of(out.term_point.size()));
+    if (v % kGroup == 0) out.first_term.push_back(size_of(count_));
     out.terms.push_back(level_.vertex[v] < 0 ? std::uint8_t{0} : add_row(level_.vertex[v], out));
   }
-  out.first_lead_term = size_of(out.term_point.size());
+  out.first_lead_term = size_of(count_);
   for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
     const std::int32_t v = level_.vertex[level_.copy_vertex[k]];
     if (level_.patch_of_cell(first_[v] / 8) != n) continue;
@@ -160,6 +167,9 @@ TransferDraft TransferRows::operator()(std::int32_t n) {
     out.lead_terms.push_back(add_row(v, out));
   }
   for (const std::int32_t taken : out.points) local_[taken] = 0;
+  const auto count = static_cast<std::ptrdiff_t>(count_);
+  out.term_point.assign(points_.begin(), points_.begin() + count);
+  out.term_weight.assign(weights_.begin(), weights_.begin() + count);
   transpose(out);
   return out;
 }

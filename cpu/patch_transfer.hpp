@@ -62,7 +62,10 @@ class TransferRows {
   const PatchedLevel& level_;
   const Level& next_;
   const FirstCells& first_;
-  Marks local_;  // per vertex of the next level: its point, from 1
+  Marks local_;                        // per vertex of the next level: its point, from 1
+  std::vector<std::uint16_t> points_;  // of the terms of a patch, and room for more
+  std::vector<std::uint8_t> weights_;
+  std::size_t count_ = 0;  // terms
   std::array<SlotTerms, 9> regular_;
   std::unordered_map<std::uint64_t, SlotTerms> others_;
 };
