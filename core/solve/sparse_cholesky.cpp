@@ -53,10 +53,13 @@ struct EigenEngine final : Engine {
     Eigen::Map<Eigen::VectorXd>(solution.data(), n) =
         llt.solve(Eigen::Map<const Eigen::VectorXd>(right.data(), n));
   }
-  std::size_t entries() const override {
-    return static_cast<std::size_t>(llt.matrixL().nestedExpression().nonZeros());
-  }
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> llt;
+  std::size_t entries() const override { return static_cast<std::size_t>(llt.entries()); }
+
+  /// Has room for its entries once it is analysed, when matrixL() must not be asked for yet.
+  struct Llt : Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> {
+    Eigen::Index entries() const { return m_matrix.nonZeros(); }
+  };
+  Llt llt;
 };
 
 #ifdef KERF_WITH_CHOLMOD
