@@ -9,11 +9,13 @@
 
 namespace kerf::cpu {
 
-/// Keeps what the first of some parts threw, on whatever thread.
+/// Keeps what the first of some parts threw, on whatever thread. The others are then left out: what
+/// a thread keeps from one to the next may be unfinished.
 class ParallelErrors {
  public:
   template <class Part>
   void run(const Part& part) noexcept {
+    if (failed_) return;
     try {
       part();
     } catch (...) {

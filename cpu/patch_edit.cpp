@@ -59,11 +59,7 @@ void PatchEdit::move_group(std::int32_t from, std::int32_t to) {
   out_.patch_of[to] = draft_.patch;
   for (std::int32_t lane = kGroup * to; lane < kGroup * (to + 1); ++lane)
     if (out_.cell[lane] >= 0) out_.lane[out_.cell[lane]] = lane;
-  std::fill_n(out_.cell.begin() + kGroup * from, kGroup, -1);
-  out_.kind[from] = kNoCells;
-  out_.row[from] = kScattered;
-  out_.slots_at[from] = -1;
-  out_.patch_of[from] = -1;
+  out_.empty_group(from);
 }
 
 /// Cells that are to be grouped again, from where they are.
@@ -130,9 +126,7 @@ void PatchEdit::close_gaps() {
       touched_.push_back(gap);
       empty_.erase(empty_.begin());
     }
-    out_.kind[last] = kNoCells;
-    out_.patch_of[last] = -1;
-    out_.slots_at[last] = -1;
+    out_.empty_group(last);
     --patch_.groups.size;
     std::erase(touched_, last);
   }

@@ -173,7 +173,7 @@ void PatchPlacer::leave() {
   for (const Draft& draft : *drafts_) {
     const Range& groups = out_.patches[draft.patch].groups;
     if (draft.anew)
-      for (std::int32_t g = groups.first; g < groups.first + groups.room; ++g) empty_group(g);
+      for (std::int32_t g = groups.first; g < groups.first + groups.room; ++g) out_.empty_group(g);
   }
 }
 
@@ -206,14 +206,6 @@ void PatchPlacer::lose_copy(const Patch& patch, std::int32_t vertex) {
   copies.insert(moved, gap);
   out_.copy_vertex[gap] = out_.copy_vertex[last];
   out_.copy_point[gap] = out_.copy_point[last];
-}
-
-void PatchPlacer::empty_group(std::int32_t g) {
-  std::fill_n(out_.cell.begin() + kGroup * g, kGroup, -1);
-  out_.kind[g] = kNoCells;
-  out_.row[g] = kScattered;
-  out_.slots_at[g] = -1;
-  out_.patch_of[g] = -1;
 }
 
 void PatchPlacer::fit_ranges() {
@@ -348,10 +340,6 @@ void PatchPlacer::fill(std::int32_t cell) {
 
 void PatchPlacer::place_children() {
   for (const Draft& draft : *drafts_) {
-    const Range& groups = out_.patches[draft.patch].groups;
-    if (draft.anew)
-      std::fill_n(out_.children.begin() + 8 * kGroup * std::ptrdiff_t{groups.first},
-                  8 * kGroup * std::ptrdiff_t{groups.size}, -1);
     for (const auto* cells : {&draft.cells, &draft.refilled})
       for (const std::int32_t c : *cells)
         if (c >= 0) fill(c);

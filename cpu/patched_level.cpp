@@ -415,6 +415,16 @@ PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change,
 
 }  // namespace
 
+void PatchedLevel::empty_group(std::int32_t g) {
+  std::fill_n(cell.begin() + kGroup * g, kGroup, -1);
+  if (!children.empty())
+    std::fill_n(children.begin() + 8 * kGroup * std::ptrdiff_t{g}, 8 * kGroup, -1);
+  kind[g] = kNoCells;
+  row[g] = kScattered;
+  slots_at[g] = -1;
+  patch_of[g] = -1;
+}
+
 void Range::fit(std::size_t count, std::int32_t& end) {
   size = 0;
   grow(count, true, end);

@@ -66,8 +66,8 @@ struct Range {
   std::int32_t first = 0, size = 0, room = 0;
 
   std::int32_t end() const { return first + size; }
-  /// Room for `count` entries, at the `end` of the array where there is too little, and then some to
-  /// spare.
+  /// Room for `count` entries, at the `end` of the array where there is too little, and then some
+  /// to spare.
   void fit(std::size_t count, std::int32_t& end);
   /// The same for so many more; when it is made, some to spare only if asked for.
   void grow(std::size_t count, bool spare, std::int32_t& end);
@@ -169,6 +169,8 @@ struct PatchedLevel {
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
   std::size_t tiles() const { return vertex.size() / kGroup; }
+  /// As if it had never had cells: of no patch, and in no sum.
+  void empty_group(std::int32_t g);
   std::int32_t patch_of_cell(std::int32_t c) const {
     return patch_of[static_cast<std::size_t>(lane[c] / kGroup)];
   }
@@ -204,8 +206,8 @@ struct PatchMoves {
   std::vector<std::int32_t> held;  ///< cells that are new or have another HeldCell
 };
 
-/// Patches in which a cut changed something are made again; the others keep their numbers. `finer`
-/// has been updated, and moved as `below` says.
+/// Brings the patches up to date after a cut: numbers stay where nothing changed, and what is new
+/// gets new ones. `finer` has been updated, and moved as `below` says.
 PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,
                           std::size_t index, const PatchedLevel* finer, const PatchMoves* below,
                           int threads, PatchedLevel& level);

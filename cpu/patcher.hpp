@@ -46,7 +46,6 @@ class PatchPlacer {
   void leave();
   void leave_copies(const Draft& draft);
   void lose_copy(const Patch& patch, std::int32_t vertex);
-  void empty_group(std::int32_t g);
   void fit_ranges();
   void write_anew(Draft& draft);
   void write_points(const Draft& draft);

@@ -177,6 +177,22 @@ inline void expect_copies(const PatchedLevel& l) {
   EXPECT_EQ(found, expected);
 }
 
+/// Groups that no patch has say so, and lanes without a cell have no children.
+inline void expect_nothing_left(const PatchedLevel& l) {
+  std::vector<bool> used(l.groups());
+  for_groups(l, [&](std::int32_t, std::size_t g) { used[g] = true; });
+  for (std::size_t g = 0; g < used.size(); ++g) {
+    EXPECT_EQ(l.kind[g] == cpu::kNoCells, !used[g]) << "group " << g;
+    EXPECT_EQ(l.patch_of[g] < 0, !used[g]) << "group " << g;
+    for (std::size_t k = 0; k < kGroup; ++k) {
+      const bool empty = l.cell[kGroup * g + k] < 0;
+      EXPECT_TRUE(empty || used[g]) << "group " << g;
+      for (std::size_t octant = 0; octant < 8 && empty && !l.children.empty(); ++octant)
+        ASSERT_EQ(l.children[64 * g + kGroup * octant + k], -1) << "group " << g << ", lane " << k;
+    }
+  }
+}
+
 /// Two children in one octant have no place of their own there.
 inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
   for (std::int32_t c = 0; c < l.level->cells(); ++c) {
@@ -263,6 +279,7 @@ inline void expect_whole(const std::vector<PatchedLevel>& levels) {
   for (std::size_t l = 0; l < levels.size(); ++l) {
     SCOPED_TRACE(::testing::Message() << "level " << l);
     expect_all_once(levels[l]);
+    expect_nothing_left(levels[l]);
     expect_corners_in_place(levels[l]);
     expect_slots(levels[l]);
     expect_rows(levels[l]);
