@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The search for what a blade may meet, for both CPU backends.
+// The search for what a blade may meet, for the reference backend.
 #pragma once
 
 #include <cstdint>

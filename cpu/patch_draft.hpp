@@ -39,13 +39,14 @@ struct Draft {
   std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> masters;
 
+  Patch before;  // the ranges as they were; of one made anew, without what was in them
+
   // Of a patch that stays.
   std::vector<std::int32_t> changed;  // cells that stay where they are, with other corners or slots
   std::vector<Corners> changed_corners, changed_slots;  // points
   std::vector<std::int32_t> refilled;                   // cells that stay, with other children
   std::vector<std::int32_t> lost;                       // ascending: vertices that leave the patch
   std::size_t folding = 0;  // groups that have a folded cell now, and had none
-  Patch before;             // its ranges as they were
 
   std::int32_t points() const { return first_point + new_points; }
   /// Whether cells get other lanes.

@@ -14,11 +14,6 @@ std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 /// A packed vertex of a draft that has no place yet.
 std::int32_t claim(std::int32_t patch) { return -2 - patch; }
 
-template <class T>
-void put(const std::vector<T>& from, std::ptrdiff_t first, std::vector<T>& to) {
-  std::copy(from.begin(), from.end(), to.begin() + first);
-}
-
 }  // namespace
 
 void PatchPlacer::place(std::vector<Draft>& drafts, const std::vector<std::int32_t>& transfers,
@@ -32,12 +27,8 @@ void PatchPlacer::place(std::vector<Draft>& drafts, const std::vector<std::int32
   for (const Draft& draft : drafts) place_own(draft);
   set_fixed();
   fit_ranges();
-  for_patches(0, size_of(drafts.size()), threads_, [&](std::int32_t i) {
-    if (drafts[i].anew)
-      write_anew(drafts[i]);
-    else
-      PatchEdit(level_, drafts[i], out_).write();
-  });
+  for_patches(0, size_of(drafts.size()), threads_,
+              [&](std::int32_t i) { PatchWriter(level_, drafts[i], out_).write(); });
   for (const Draft& draft : drafts)
     if (draft.moves_cells()) moves.groups.push_back(out_.patches[draft.patch].groups);
   list_copies();
@@ -219,9 +210,9 @@ void PatchPlacer::fit_ranges() {
         std::count_if(draft.vertices.begin(), draft.vertices.end(), [&](std::int32_t v) {
           return PatchedLevel::is_shared(out_.home[out_.packed[v] / kGroup]);
         }));
-    draft.before = patch;
     if (draft.anew)
       patch.groups.size = patch.copies.size = patch.hanging.size = patch.folded.size = 0;
+    draft.before = patch;
     // Cuts bring parts of cells to stored levels, and copies to all.
     patch.groups.grow(draft.row.size(), finer_ != nullptr, groups);
     patch.copies.grow(shared, true, copies);
@@ -245,44 +236,6 @@ void PatchPlacer::fit_ranges() {
   if (all_anew) out_.groups_built = all, out_.tiles_built = out_.tiles();
 }
 
-/// What is written is freed, since drafts together are as large as the level.
-void PatchPlacer::write_anew(Draft& draft) {
-  const Patch& patch = out_.patches[draft.patch];
-  const std::int32_t first = patch.groups.first;
-  put(draft.cells, kGroup * first, out_.cell);
-  put(draft.corners, 8 * kGroup * std::ptrdiff_t{first}, out_.corners);
-  put(draft.kind, first, out_.kind);
-  put(draft.row, first, out_.row);
-  put(draft.slots, 8 * kGroup * std::ptrdiff_t{patch.folded.first}, out_.slots);
-  std::int32_t slots = patch.folded.first;
-  for (std::size_t g = 0; g < draft.folded.size(); ++g) {
-    out_.slots_at[static_cast<std::size_t>(first) + g] = draft.folded[g] != 0 ? slots++ : -1;
-    out_.patch_of[static_cast<std::size_t>(first) + g] = draft.patch;
-  }
-  for (std::size_t k = 0; k < draft.cells.size(); ++k)
-    if (draft.cells[k] >= 0) out_.lane[draft.cells[k]] = kGroup * first + size_of(k);
-  draft.corners = {};
-  draft.slots = {};
-  write_points(draft);
-}
-
-void PatchPlacer::write_points(const Draft& draft) {
-  const Patch& patch = out_.patches[draft.patch];
-  std::fill_n(out_.own_point.begin() + patch.own.first, patch.own.size, kNothing);
-  std::int32_t k = patch.copies.first;
-  for (std::size_t n = 0; n < draft.vertices.size(); ++n) {
-    const std::int32_t packed = out_.packed[draft.vertices[n]];
-    if (out_.home[packed / kGroup] == draft.patch) {
-      out_.own_point[packed] = draft.vertex_point[n];
-    } else {
-      out_.copy_point[k] = draft.vertex_point[n];
-      out_.copy_vertex[k++] = packed;
-    }
-  }
-  put(draft.hanging_point, patch.hanging.first, out_.hanging_point);
-  put(draft.masters, patch.hanging.first, out_.hanging_masters);
-}
-
 /// The copies of each shared vertex.
 void PatchPlacer::list_copies() {
   if (change_ == nullptr) return list_all_copies();
@@ -290,11 +243,10 @@ void PatchPlacer::list_copies() {
   while (size_of(out_.copies_begin.size()) - 1 < out_.shared) copies.append({});
   for (const Draft& draft : *drafts_) {
     const Range &range = out_.patches[draft.patch].copies, &before = draft.before.copies;
-    std::int32_t first = range.first;
-    if (!draft.anew && range.first == before.first) first = before.end();
-    if (!draft.anew && range.first != before.first)
-      for (std::int32_t k = before.first; k < before.end(); ++k)
-        copies.remove(out_.shared_number(out_.copy_vertex[k]), k);
+    const bool moved = range.first != before.first;
+    const std::int32_t first = moved ? range.first : before.end();
+    for (std::int32_t k = before.first; moved && k < before.end(); ++k)
+      copies.remove(out_.shared_number(out_.copy_vertex[k]), k);
     for (std::int32_t k = first; k < range.end(); ++k)
       copies.insert(out_.shared_number(out_.copy_vertex[k]), k);
   }

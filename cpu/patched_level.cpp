@@ -2,6 +2,7 @@
 #include "cpu/patched_level.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <numeric>
 #include <span>
@@ -69,18 +70,18 @@ class Patcher {
     extend();
     for (const std::int32_t c : all) out_.held[c] = held_of(c);
     for (auto& cells : divide(level_, all, patch_cells(level_.cells()))) add_patch(cells);
-    make_drafts(0);
+    make_drafts();
     place();
   }
 
-  PatchMoves update(const HierarchyChange& change, std::size_t index, const PatchMoves* below) {
-    change_ = &change.levels[index];
+  PatchMoves update(const HierarchyChange& change, const PatchMoves* below) {
+    change_ = &change.levels[index_];
     extend();
     works_.resize(out_.patches.size());
-    mark(index + 1 < change.levels.size() ? &change.levels[index + 1] : nullptr, below);
+    mark(next_ != nullptr ? &change.levels[index_ + 1] : nullptr, below);
     for (std::int32_t p = 0, count = size_of(works_.size()); p < count; ++p)
       if (works_[p].any()) draft_patch(p);
-    make_drafts(0);
+    make_drafts();
     // A vertex of another patch alone is now shared with it, so that one changes too.
     for (std::size_t n = 0, end = drafts_.size(); n < end; ++n)
       for (std::size_t i = 0; i < drafts_[n].vertices.size(); ++i)
@@ -245,12 +246,15 @@ class Patcher {
 
   void draft_patch(std::int32_t p) {
     Work& work = works_[p];
-    std::vector<std::int32_t> cells;
-    const Range groups = out_.patches[p].groups;
-    for (std::int32_t lane = kGroup * groups.first; lane < kGroup * groups.end(); ++lane)
-      if (out_.cell[lane] >= 0) cells.push_back(out_.cell[lane]);
-    if (may_stay(p, cells.size())) return change(stay(p), work);
+    const Range& groups = out_.patches[p].groups;
+    const auto first = out_.cell.begin() + kGroup * groups.first,
+               last = out_.cell.begin() + kGroup * groups.end();
+    const auto is_cell = [](std::int32_t c) { return c >= 0; };
+    if (may_stay(p, static_cast<std::size_t>(std::count_if(first, last, is_cell))))
+      return change(stay(p), work);
     work.drafted = true;
+    std::vector<std::int32_t> cells;
+    std::copy_if(first, last, std::back_inserter(cells), is_cell);
     cells.insert(cells.end(), work.arrived.begin(), work.arrived.end());
     const std::int32_t most = patch_cells(level_.cells());
     if (size_of(cells.size()) <= most + most / 2) return void(add_draft(p, cells));
@@ -326,10 +330,9 @@ class Patcher {
     }
   }
 
-  void make_drafts(std::size_t begin) {
+  void make_drafts() {
     for_patches(
-        size_of(begin), size_of(drafts_.size()), threads_,
-        [&] { return std::make_unique<Numbering>(out_); },
+        0, size_of(drafts_.size()), threads_, [&] { return std::make_unique<Numbering>(out_); },
         [&](std::int32_t i, Numbering& numbering) {
           if (!drafts_[i].anew) find_lost(drafts_[i]);
           make_draft(level_, drafts_[i], numbering);
@@ -453,7 +456,7 @@ PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& cha
                           int threads, PatchedLevel& level) {
   if (level.groups() > 2 * level.groups_built || level.tiles() > 2 * level.tiles_built)
     return remake_patches(hierarchy, change.levels[index], index, finer, threads, level);
-  return Patcher(hierarchy, index, finer, threads, level).update(change, index, below);
+  return Patcher(hierarchy, index, finer, threads, level).update(change, below);
 }
 
 }  // namespace kerf::cpu

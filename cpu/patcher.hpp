@@ -47,8 +47,6 @@ class PatchPlacer {
   void leave_copies(const Draft& draft);
   void lose_copy(const Patch& patch, std::int32_t vertex);
   void fit_ranges();
-  void write_anew(Draft& draft);
-  void write_points(const Draft& draft);
   void list_copies();
   void list_all_copies();
   void place_child(std::int32_t child);
@@ -66,10 +64,11 @@ class PatchPlacer {
   PatchMoves* moves_ = nullptr;
 };
 
-/// Writes what changes in a patch that stays. Touches nothing of other patches.
-class PatchEdit {
+/// Writes a draft into the ranges of its patch: all of it, or what changes in one that stays.
+/// Touches nothing of other patches.
+class PatchWriter {
  public:
-  PatchEdit(const Level& level, Draft& draft, PatchedLevel& out)
+  PatchWriter(const Level& level, Draft& draft, PatchedLevel& out)
       : level_(level), draft_(draft), patch_(out.patches[draft.patch]), out_(out) {}
   void write();
 

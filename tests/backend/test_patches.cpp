@@ -58,17 +58,34 @@ TEST(Patches, AreWholeWithoutDuplicates) {
   test::expect_whole(patches_of(p.hierarchy, 1));
 }
 
+/// All that a sweep, a transfer or a coarse matrix reads.
+void expect_same(const PatchedLevel& a, const PatchedLevel& b) {
+  EXPECT_EQ(a.cell, b.cell);
+  EXPECT_EQ(a.corners, b.corners);
+  EXPECT_EQ(a.slots, b.slots);
+  EXPECT_EQ(a.slots_at, b.slots_at);
+  EXPECT_EQ(a.kind, b.kind);
+  EXPECT_EQ(a.row, b.row);
+  EXPECT_EQ(a.children, b.children);
+  EXPECT_EQ(a.vertex, b.vertex);
+  EXPECT_EQ(a.own_point, b.own_point);
+  EXPECT_EQ(a.copy_point, b.copy_point);
+  EXPECT_EQ(a.copy_vertex, b.copy_vertex);
+  EXPECT_EQ(a.copies_of, b.copies_of);
+  EXPECT_EQ(a.hanging_point, b.hanging_point);
+  EXPECT_EQ(a.hanging_masters, b.hanging_masters);
+  EXPECT_EQ(a.transfer.point, b.transfer.point);
+  EXPECT_EQ(a.transfer.term_point, b.transfer.term_point);
+  EXPECT_EQ(a.transfer.term_weight, b.transfer.term_weight);
+  EXPECT_EQ(a.transfer.given_row, b.transfer.given_row);
+  EXPECT_EQ(a.transfer.givers, b.transfer.givers);
+}
+
 TEST(Patches, AreTheSameForAnyNumberOfThreads) {
   const Problem p = cut_octree(true);
   const std::vector<PatchedLevel> one = patches_of(p.hierarchy, 1),
                                   more = patches_of(p.hierarchy, 3);
-  for (std::size_t l = 0; l < one.size(); ++l) {
-    EXPECT_EQ(one[l].cell, more[l].cell);
-    EXPECT_EQ(one[l].corners, more[l].corners);
-    EXPECT_EQ(one[l].vertex, more[l].vertex);
-    EXPECT_EQ(one[l].hanging_masters, more[l].hanging_masters);
-    EXPECT_EQ(one[l].transfer.term_point, more[l].transfer.term_point);
-  }
+  for (std::size_t l = 0; l < one.size(); ++l) expect_same(one[l], more[l]);
 }
 
 /// Patches that follow the cuts of a body, with a vector and lanes that they move.
@@ -167,29 +184,6 @@ std::vector<std::int32_t> some_vertices(const Level& level, test::Dice& dice) {
     if (far <= 2) out.push_back(v);
   }
   return out;
-}
-
-/// All that a sweep, a transfer or a coarse matrix reads.
-void expect_same(const PatchedLevel& a, const PatchedLevel& b) {
-  EXPECT_EQ(a.cell, b.cell);
-  EXPECT_EQ(a.corners, b.corners);
-  EXPECT_EQ(a.slots, b.slots);
-  EXPECT_EQ(a.slots_at, b.slots_at);
-  EXPECT_EQ(a.kind, b.kind);
-  EXPECT_EQ(a.row, b.row);
-  EXPECT_EQ(a.children, b.children);
-  EXPECT_EQ(a.vertex, b.vertex);
-  EXPECT_EQ(a.own_point, b.own_point);
-  EXPECT_EQ(a.copy_point, b.copy_point);
-  EXPECT_EQ(a.copy_vertex, b.copy_vertex);
-  EXPECT_EQ(a.copies_of, b.copies_of);
-  EXPECT_EQ(a.hanging_point, b.hanging_point);
-  EXPECT_EQ(a.hanging_masters, b.hanging_masters);
-  EXPECT_EQ(a.transfer.point, b.transfer.point);
-  EXPECT_EQ(a.transfer.term_point, b.transfer.term_point);
-  EXPECT_EQ(a.transfer.term_weight, b.transfer.term_weight);
-  EXPECT_EQ(a.transfer.given_row, b.transfer.given_row);
-  EXPECT_EQ(a.transfer.givers, b.transfer.givers);
 }
 
 void cut_and_follow(std::uint64_t seed, int refinement, int blades, Counts& counts) {

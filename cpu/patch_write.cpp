@@ -16,21 +16,21 @@ void move_items(const Range& before, const Range& now, std::ptrdiff_t width,
 
 }  // namespace
 
-void PatchEdit::write() {
-  move_ranges();
-  remove_cells();
+void PatchWriter::write() {
+  if (!draft_.anew) move_ranges();
+  if (!draft_.anew) remove_cells();
   add_groups();
   close_gaps();
   change_cells();
   add_points();
-  drop_hanging();
+  if (!draft_.anew) drop_hanging();
   std::sort(touched_.begin(), touched_.end());
   touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
   for (const std::int32_t g : touched_)
     out_.row[g] = row_kind(out_.corners.data() + 8 * kGroup * static_cast<std::size_t>(g));
 }
 
-void PatchEdit::move_ranges() {
+void PatchWriter::move_ranges() {
   const Patch& before = draft_.before;
   constexpr std::ptrdiff_t kBlock = 8 * kGroup;
   move_items(before.copies, patch_.copies, 1, out_.copy_point);
@@ -47,7 +47,7 @@ void PatchEdit::move_ranges() {
 }
 
 /// All that the arrays of a level say of a group.
-void PatchEdit::move_group(std::int32_t from, std::int32_t to) {
+void PatchWriter::move_group(std::int32_t from, std::int32_t to) {
   constexpr std::ptrdiff_t kBlock = 8 * kGroup;
   std::copy_n(out_.cell.begin() + kGroup * from, kGroup, out_.cell.begin() + kGroup * to);
   std::copy_n(out_.corners.begin() + kBlock * from, kBlock, out_.corners.begin() + kBlock * to);
@@ -63,7 +63,7 @@ void PatchEdit::move_group(std::int32_t from, std::int32_t to) {
 }
 
 /// Cells that are to be grouped again, from where they are.
-void PatchEdit::remove_cells() {
+void PatchWriter::remove_cells() {
   for (const std::int32_t c : draft_.cells) {
     if (c < 0 || out_.lane[c] < 0) continue;
     const std::int32_t lane = std::exchange(out_.lane[c], -1), group = lane / kGroup;
@@ -86,8 +86,9 @@ void PatchEdit::remove_cells() {
   std::sort(empty_.begin(), empty_.end());
 }
 
-/// New groups, first where others became empty.
-void PatchEdit::add_groups() {
+/// New groups, first where others became empty. What is written is freed, since drafts together are
+/// as large as the level.
+void PatchWriter::add_groups() {
   std::int32_t end = patch_.groups.first + draft_.before.groups.size;
   next_block_ = patch_.folded.first + draft_.before.folded.size;
   std::size_t used = 0, block = 0;
@@ -113,27 +114,29 @@ void PatchEdit::add_groups() {
   }
   empty_.erase(empty_.begin(), empty_.begin() + static_cast<std::ptrdiff_t>(used));
   patch_.groups.size = end - patch_.groups.first;
+  draft_.corners = {};
+  draft_.slots = {};
 }
 
 /// The last groups go where groups are empty.
-void PatchEdit::close_gaps() {
+void PatchWriter::close_gaps() {
   while (!empty_.empty()) {
     const std::int32_t last = patch_.groups.end() - 1, gap = empty_.front();
     if (empty_.back() == last) {
       empty_.pop_back();
+      out_.empty_group(last);
     } else {
       move_group(last, gap);
       touched_.push_back(gap);
       empty_.erase(empty_.begin());
     }
-    out_.empty_group(last);
     --patch_.groups.size;
     std::erase(touched_, last);
   }
 }
 
 /// Other corners of cells that stay where they are.
-void PatchEdit::change_cells() {
+void PatchWriter::change_cells() {
   for (std::size_t n = 0; n < draft_.changed.size(); ++n) {
     const std::int32_t c = draft_.changed[n], lane = out_.lane[c], group = lane / kGroup;
     const auto put = [&](const Draft::Corners& from, std::int32_t block,
@@ -151,14 +154,16 @@ void PatchEdit::change_cells() {
 }
 
 /// Slots of a group that had none of its own, since no corner hung: they are its corners.
-void PatchEdit::fold_group(std::int32_t group) {
+void PatchWriter::fold_group(std::int32_t group) {
   const std::int32_t block = next_block_++;
   std::copy_n(out_.corners.begin() + 8 * kGroup * std::ptrdiff_t{group}, 8 * kGroup,
               out_.slots.begin() + 8 * kGroup * std::ptrdiff_t{block});
   out_.slots_at[group] = block;
 }
 
-void PatchEdit::add_points() {
+void PatchWriter::add_points() {
+  if (draft_.anew)
+    std::fill_n(out_.own_point.begin() + patch_.own.first, patch_.own.size, kNothing);
   std::int32_t k = patch_.copies.first + draft_.before.copies.size;
   for (std::size_t n = 0; n < draft_.vertices.size(); ++n) {
     const std::int32_t packed = out_.packed[draft_.vertices[n]];
@@ -176,7 +181,7 @@ void PatchEdit::add_points() {
 }
 
 /// Takes off the list what no cell has any more: some of its masters may not be points any more.
-void PatchEdit::drop_hanging() {
+void PatchWriter::drop_hanging() {
   if (patch_.hanging.size == 0) return;
   std::vector<bool> used(static_cast<std::size_t>(patch_.points));
   for (std::int32_t g = patch_.groups.first; g < patch_.groups.end(); ++g)
