@@ -32,7 +32,8 @@ struct StepReport {
   double time = 0;  ///< s, at the end of the step
   int rotation_updates = 0;
   int cycles = 0;              ///< multigrid cycles or CG iterations, all linear solves together
-  double linear_residual = 0;  ///< largest true relative residual of its linear solves
+  double linear_residual = 0;  ///< true relative residual of its last linear solve; in static mode
+                               ///< the largest of them
   double residual = 0;         ///< relative residual of the nonlinear equation at the end; the
                                ///< largest double if the motion blew up, which ends the run
   bool converged = true;       ///< linear solves and, in static mode, equilibrium

@@ -3,8 +3,9 @@
 // Dynamics: one implicit time step, with rotation updates inside it.
 //
 // Newmark (beta 1/4, gamma 1/2), and the survey's scheme with a second difference of u and a
-// central difference for damping, stiffness at the new time. Both start from u_n: with few cycles
-// a predictor as start blows up (docs/convergence.md).
+// central difference for damping, stiffness at the new time. The displacement starts from u_n, for
+// the residual of a predicted one is a hundred times as large; the first rotations are those of
+// where the body is going (docs/decisions/0016-rotations-ahead.md).
 // Source  [DGW11] section 5; [WWD15] appendix A.4, equations 46 to 48.
 #pragma once
 
@@ -25,7 +26,7 @@ struct StateVectors {
 struct NonlinearStats {
   int rotation_updates = 0;
   int cycles = 0;
-  double linear_residual = 0;  ///< the largest of the linear solves
+  double linear_residual = 0;  ///< dynamics: of the last linear solve; statics: the largest
   double residual = 0;         ///< of the equation of motion, relative to its largest term
   bool converged = true;
 };
@@ -43,8 +44,10 @@ class Motion {
   // Coefficients of u_{n+1} in velocity and acceleration.
   double velocity_factor() const;
   double acceleration_factor() const;
+  void place_ahead(int out);  // where the body would move on to from u_n without forces
   void begin_step();
-  void residual(int out);  // external - elastic - damping - inertia, of the current iterate
+  /// external - elastic - damping - inertia, of the current iterate; returns its norm.
+  double residual(int out);
 
   Backend& backend_;
   LinearSolver& solver_;
