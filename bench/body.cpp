@@ -2,9 +2,9 @@
 #include "bench/body.hpp"
 
 #include <cmath>
-#include <cstring>
 
 #include "core/base/error.hpp"
+#include "core/base/hash.hpp"
 #include "core/body/cut.hpp"
 #include "core/body/pieces.hpp"
 #include "core/fem/held.hpp"
@@ -21,23 +21,6 @@ LinkedOctree cut_octree(const SimulationSetup& setup) {
     cut(out, {}, blade.lines.empty() ? blade.mesh : sweep(blade.lines), ++id);
   return out;
 }
-
-// FNV-1a, byte by byte, as the state hash of a simulation.
-class Hash {
- public:
-  void add(const void* bytes, std::size_t count) {
-    const auto* at = static_cast<const unsigned char*>(bytes);
-    for (std::size_t i = 0; i < count; ++i) value_ = (value_ ^ at[i]) * 0x100000001B3U;
-  }
-  template <class T>
-  void add(const std::vector<T>& values) {
-    add(values.data(), values.size() * sizeof(T));
-  }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xCBF29CE484222325U;
-};
 
 }  // namespace
 

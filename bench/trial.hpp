@@ -67,7 +67,6 @@ struct Trial {
   std::unique_ptr<Structure> structure, structure_before;  // the same
   std::vector<double> bent_values;
   CutEvent event;
-  bool in_place = false;  // the last blade changed the coarse levels in place
 
   Backend& backend() { return machine.backend(); }
   /// Frees what a phase kept.

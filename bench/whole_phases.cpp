@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "bench/phases.hpp"
+#include "core/base/beside.hpp"
 #include "core/base/error.hpp"
 #include "core/base/timer.hpp"
 #include "core/body/cut.hpp"
@@ -58,7 +59,7 @@ NearCells find_near(const Trial& t, const BladeReach& reach) {
   return near_cells(t.structure->hierarchy(), t.bent_values, reach, t.structure->opened());
 }
 
-void run_cut_topology(Trial& t) {
+void cut_octree(Trial& t) {
   const Hierarchy& levels = t.structure->hierarchy();
   const Vec3d origin = t.octree->lattice().origin;
   const NearCells near = find_near(t, BladeReach(t.body.blade(), origin));
@@ -74,15 +75,25 @@ void run_cut_topology(Trial& t) {
   const auto id = static_cast<std::int32_t>(t.body.setup().cuts.size()) + 1;
   t.event = cut_near(*t.octree, leaves, t.body.blade(), id);
   ensures(t.event.changed(), "the blade of the bench meets its body");
-  t.in_place = t.structure->update(*t.octree, t.event);
-  t.surface->bind(*t.octree);
+}
+
+void run_cut_topology(Trial& t) {
+  cut_octree(t);
+  t.structure->update(*t.octree, t.event);
 }
 
 void run_cut(Trial& t) {
-  run_cut_topology(t);
-  t.surface->update(*t.octree, t.event);
-  t.surface->bind(*t.octree);
-  follow(t.backend(), *t.structure, t.in_place);
+  cut_octree(t);
+  run_beside(
+      t.backend().threads() > 1,
+      [&] {
+        t.surface->update(*t.octree, t.event);
+        t.surface->bind(*t.octree);
+      },
+      [&] {
+        const bool in_place = t.structure->update(*t.octree, t.event);
+        follow(t.backend(), *t.structure, in_place);
+      });
 }
 
 Outcome outcome_cut(Trial& t) {

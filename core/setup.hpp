@@ -92,7 +92,7 @@ struct SolverSetup {
   CycleType cycle = CycleType::automatic;
   SmootherType smoother = SmootherType::chebyshev;
   int pre_sweeps = 1, post_sweeps = 1;
-  double omega = 1.0;            ///< over-relaxation of Gauss-Seidel, in (0, 2)
+  double omega = 1.0;  ///< over-relaxation of Gauss-Seidel, in (0, 2)
   /// True residual after the last linear solve of a time step, relative to that before the step;
   /// the solves before it stop at a tenth of what they start from. In static mode each solve stops
   /// at this, or at 0.003 if that is more.
@@ -110,9 +110,9 @@ struct SolverSetup {
 
 /// How the surface is drawn on the dual grid of links. Source  [DGW11] section 7, [WWD15] 2.3.2.
 enum class SurfaceMethod {
-  none,              ///< no surface
-  dual_contouring,   ///< a vertex for each side of a cut in each dual cell
-  splitting_cubes,   ///< two vertices for each cut link, and one in the middle of each patch
+  none,             ///< no surface
+  dual_contouring,  ///< a vertex for each side of a cut in each dual cell
+  splitting_cubes,  ///< two vertices for each cut link, and one in the middle of each patch
 };
 
 struct SimulationSetup {

@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <limits>
 #include <numeric>
 #include <utility>
 
+#include "core/base/beside.hpp"
 #include "core/base/error.hpp"
+#include "core/base/hash.hpp"
 #include "core/base/memory.hpp"
 #include "core/base/timer.hpp"
 #include "core/cut_schedule.hpp"
@@ -81,6 +82,7 @@ struct Simulation::Impl {
   void update_backend();
   Kept read_state(std::int32_t vertices, std::int32_t cells) const;
   void write_state(Kept kept);
+  void change_surface(const CutEvent& event);
   void bind_surface();
   void move_surface();
   void check_memory() const;
@@ -199,6 +201,15 @@ void Simulation::Impl::load_structure() {
   solver.set_structure(hierarchy());
 }
 
+void Simulation::Impl::change_surface(const CutEvent& event) {
+  if (!surface) return;
+  {
+    const AddTime timer(clock.surface);
+    surface->update(body, event);
+  }
+  if (event.changed() || !event.moved.empty()) bind_surface();
+}
+
 void Simulation::Impl::bind_surface() {
   if (!surface) return;
   const AddTime timer(clock.surface_bind);
@@ -288,15 +299,14 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   const CutEvent event = make_cut(due);
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
-  if (surface) {
-    const AddTime timer(clock.surface);
-    surface->update(body, event);
-  }
-  if (event.changed()) {
-    check_memory();
-    change_structure(event);
-  }
-  if (event.changed() || !event.moved.empty()) bind_surface();
+  if (event.changed()) check_memory();
+  // The surface needs the octree alone, and is as serial as the levels are.
+  const bool beside = surface && event.changed() && backend->threads() > 1;
+  run_beside(
+      beside, [&] { change_surface(event); },
+      [&] {
+        if (event.changed()) change_structure(event);
+      });
   return event.changed();
 }
 
@@ -554,18 +564,10 @@ SurfaceMesh Simulation::surface_mesh() const {
 }
 
 std::uint64_t Simulation::state_hash() const {
-  // FNV-1a over the bits, in vertex order.
-  std::uint64_t hash = 0xCBF29CE484222325U;
+  Hash hash;  // in vertex order
   for (const int x : {impl_->state.displacement, impl_->state.velocity})
-    for (const double value : impl_->read_vector(x)) {
-      std::uint64_t bits;
-      std::memcpy(&bits, &value, sizeof bits);
-      for (int k = 0; k < 8; ++k) {
-        hash ^= (bits >> (8 * k)) & 255;
-        hash *= 0x100000001B3U;
-      }
-    }
-  return hash;
+    hash.add(impl_->read_vector(x));
+  return hash.value();
 }
 
 Box3 Simulation::deformed_box() const {

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+namespace kerf {
+
+/// FNV-1a, byte by byte as they lie in memory: tells states apart, and is not for security.
+/// Source  Fowler, Noll, Vo: 64 bits, offset basis and prime of theirs.
+class Hash {
+ public:
+  void add(const void* bytes, std::size_t count) {
+    const auto* at = static_cast<const unsigned char*>(bytes);
+    for (std::size_t i = 0; i < count; ++i) value_ = (value_ ^ at[i]) * 0x100000001B3U;
+  }
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void add(const std::vector<T>& values) { add(values.data(), values.size() * sizeof(T)); }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xCBF29CE484222325U;
+};
+
+}  // namespace kerf

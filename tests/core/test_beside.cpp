@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+//
+// Two pieces of work at once: both end, and neither takes the other's errors away.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "core/base/beside.hpp"
+
+namespace kerf {
+namespace {
+
+class Beside : public testing::TestWithParam<bool> {};
+
+TEST_P(Beside, BothHaveEnded) {
+  bool aside = false, here = false;
+  std::thread::id thread;
+
+  run_beside(
+      GetParam(),
+      [&] {
+        aside = true;
+        thread = std::this_thread::get_id();
+      },
+      [&] { here = true; });
+
+  EXPECT_TRUE(aside);
+  EXPECT_TRUE(here);
+  EXPECT_EQ(thread != std::this_thread::get_id(), GetParam());
+}
+
+TEST_P(Beside, AnErrorOfOneComesWhenTheOtherHasEnded) {
+  std::atomic<int> ended = 0;
+  const auto fail = [](const char* what) { throw std::runtime_error(what); };
+  const auto what_of = [&](const auto& aside, const auto& here) -> std::string {
+    try {
+      run_beside(GetParam(), aside, here);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "nothing";
+  };
+
+  EXPECT_EQ(what_of([&] { fail("aside"); }, [&] { ++ended; }), "aside");
+  EXPECT_EQ(ended, 1);
+  EXPECT_EQ(what_of([&] { ++ended; }, [&] { fail("here"); }), "here");
+  EXPECT_EQ(ended, 2);
+  EXPECT_EQ(what_of([&] { fail("aside"); }, [&] { fail("here"); }), "here");
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, Beside, testing::Bool(), [](const auto& way) {
+  return way.param ? "OnAThreadOfItsOwn" : "OneAfterTheOther";
+});
+
+}  // namespace
+}  // namespace kerf
