@@ -94,8 +94,9 @@ struct SolverSetup {
   int pre_sweeps = 1, post_sweeps = 1;
   double omega = 1.0;  ///< over-relaxation of Gauss-Seidel, in (0, 2)
   /// True residual after the last linear solve of a time step, relative to that before the step;
-  /// the solves before it stop at a tenth of what they start from. In static mode each solve stops
-  /// at this, or at 0.003 if that is more.
+  /// the solves before it stop at a tenth of what they start from, or where the
+  /// rotations undo the rest (docs/decisions/0016-early-updates.md). In static mode each solve
+  /// stops at this, or at 0.003 if that is more.
   double tolerance = 1e-6;
   int cycles = 0;                ///< > 0: this fixed number instead of the tolerance
   int max_cycles = 500;          ///< before giving up; cg_jacobi: 50 times as many

@@ -17,8 +17,10 @@ class Hash {
     for (std::size_t i = 0; i < count; ++i) value_ = (value_ ^ at[i]) * 0x100000001B3U;
   }
   template <class T>
-  requires std::is_trivially_copyable_v<T>
-  void add(const std::vector<T>& values) { add(values.data(), values.size() * sizeof(T)); }
+  requires(std::is_floating_point_v<T> ||
+           std::has_unique_object_representations_v<T>) void add(const std::vector<T>& values) {
+    add(values.data(), values.size() * sizeof(T));
+  }
   std::uint64_t value() const { return value_; }
 
  private:

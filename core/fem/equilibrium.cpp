@@ -43,7 +43,7 @@ double Equilibrium::residual() {
 // Solves for the increment of the current iterate; the force is in right_ already.
 double Equilibrium::update(double mass_factor) {
   // The rotations move as well: more digits cost cycles and save next to no update
-  // (docs/decisions/0016-rotations-ahead.md).
+  // (docs/decisions/0016-early-updates.md).
   constexpr double kInner = 3e-3;
   backend_.set_operator({1, mass_factor});
   solver_.refresh();

@@ -9,8 +9,9 @@ namespace {
 
 constexpr double kBeta = 0.25, kGamma = 0.5;  // Newmark: second order, no numerical damping
 
-/// Of its residual, that an update but the last leaves: the rotations move, and more comes back.
-constexpr double kEarly = 0.1;
+/// Of its residual, that an update but the last leaves at most, and of what came back in the step
+/// before when the rotations had moved.
+constexpr double kEarly = 0.1, kOfReturned = 0.5;
 
 }  // namespace
 
@@ -26,7 +27,8 @@ Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
       right_(backend.add_vector()),
       increment_(backend.add_vector()),
       work_(solver.spare()[0]),
-      scratch_(solver.spare()[1]) {}
+      scratch_(solver.spare()[1]),
+      returned_(static_cast<std::size_t>(setup.rotation_updates), 1.0) {}
 
 double Motion::velocity_factor() const {
   return time_.scheme == TimeScheme::newmark ? kGamma / (kBeta * time_.step) : 0.5 / time_.step;
@@ -70,22 +72,11 @@ void Motion::start() {
   backend_.add(0, 0.5 * time_.step * time_.step, increment_, state_.memory);
 }
 
-// The acceleration is left out: without damping it swings.
-void Motion::place_ahead(int out) {
-  backend_.copy(0, state_.displacement, out);
-  if (time_.scheme == TimeScheme::newmark) {
-    backend_.add(0, time_.step, state_.velocity, out);
-  } else {
-    backend_.add(0, 1, state_.displacement, out);
-    backend_.add(0, -1, state_.memory, out);
-  }
-}
-
 // Velocity and acceleration of the guess u_{n+1} = u_n.
 void Motion::begin_step() {
   const double dt = time_.step;
   if (time_.scheme == TimeScheme::newmark) {
-    const int before = right_;  // a_n
+    const int before = increment_;  // a_n
     backend_.copy(0, acceleration_, before);
     backend_.combine(0, -1 / (kBeta * dt), state_.velocity, 1 - 0.5 / kBeta, acceleration_);
     backend_.add(0, dt * (1 - kGamma), before, state_.velocity);
@@ -116,24 +107,26 @@ double Motion::residual(int out) {
 
 NonlinearStats Motion::step() {
   NonlinearStats stats;
-  place_ahead(increment_);
   begin_step();
   backend_.set_operator({1 + material_.stiffness_damping * velocity_factor(),
                          acceleration_factor() + material_.mass_damping * velocity_factor()});
-  // What is to be reached does not depend on how well the rotations are guessed.
-  const double reference = residual(right_);
-  backend_.rotate_cells(increment_);
+  double reference = 0, last = 0;  // residual before the first update, and before the last one
   for (int update = 0; update < setup_.rotation_updates; ++update) {
-    if (update > 0) backend_.rotate_cells(state_.displacement);
+    backend_.rotate_cells(state_.displacement);
     const double before = residual(right_);
+    if (update == 0) reference = before;  // later ones correct a remainder
+    if (update > 0 && last > 0) returned_[update - 1] = before / last;
+    last = before;
     double tolerance = setup_.tolerance;
-    if (update + 1 < setup_.rotation_updates && reference > 0)
-      tolerance = std::max(tolerance, kEarly * before / reference);
+    if (update + 1 < setup_.rotation_updates && reference > 0) {
+      const double leave = std::min(kEarly, kOfReturned * returned_[update]);
+      tolerance = std::max(tolerance, leave * before / reference);
+    }
     solver_.refresh();
     const SolveStats solve = solver_.solve_from_zero(right_, increment_, tolerance, reference);
     stats.cycles += solve.cycles;
     stats.linear_residual = solve.residual;
-    stats.converged = solve.converged;
+    stats.converged = stats.converged && solve.converged;
     ++stats.rotation_updates;
     if (!std::isfinite(solve.residual)) {  // overflow: nothing below would be a number
       stats.residual = solve.residual;

@@ -3,9 +3,8 @@
 // Dynamics: one implicit time step, with rotation updates inside it.
 //
 // Newmark (beta 1/4, gamma 1/2), and the survey's scheme with a second difference of u and a
-// central difference for damping, stiffness at the new time. The displacement starts from u_n, for
-// the residual of a predicted one is a hundred times as large; the first rotations are those of
-// where the body is going (docs/decisions/0016-rotations-ahead.md).
+// central difference for damping, stiffness at the new time. Both start from u_n, displacement and
+// rotations: predicted ones let stiff modes ring (docs/decisions/0016-early-updates.md).
 // Source  [DGW11] section 5; [WWD15] appendix A.4, equations 46 to 48.
 #pragma once
 
@@ -44,7 +43,6 @@ class Motion {
   // Coefficients of u_{n+1} in velocity and acceleration.
   double velocity_factor() const;
   double acceleration_factor() const;
-  void place_ahead(int out);  // where the body would move on to from u_n without forces
   void begin_step();
   /// external - elastic - damping - inertia, of the current iterate; returns its norm.
   double residual(int out);
@@ -56,7 +54,9 @@ class Motion {
   SolverSetup setup_;
   StateVectors state_;
   int acceleration_, right_, increment_, work_, scratch_;
-  double largest_force_ = 0;  // of the terms of the last residual
+  std::vector<double> returned_;  // per update: the residual after it over that before it, when the
+                                  // rotations had moved, in the last step
+  double largest_force_ = 0;      // of the terms of the last residual
 };
 
 }  // namespace kerf

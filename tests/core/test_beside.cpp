@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <latch>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -13,9 +15,9 @@
 namespace kerf {
 namespace {
 
-class Beside : public testing::TestWithParam<bool> {};
+class BesideWays : public testing::TestWithParam<bool> {};
 
-TEST_P(Beside, BothHaveEnded) {
+TEST_P(BesideWays, BothHaveEnded) {
   bool aside = false, here = false;
   std::thread::id thread;
 
@@ -32,7 +34,17 @@ TEST_P(Beside, BothHaveEnded) {
   EXPECT_EQ(thread != std::this_thread::get_id(), GetParam());
 }
 
-TEST_P(Beside, AnErrorOfOneComesWhenTheOtherHasEnded) {
+// Each waits for the other: one after the other would never end.
+TEST(Beside, BothAreUnderWayAtOnce) {
+  std::latch both(2);
+
+  run_beside(
+      true, [&] { both.arrive_and_wait(); }, [&] { both.arrive_and_wait(); });
+
+  EXPECT_TRUE(both.try_wait());
+}
+
+TEST_P(BesideWays, AnErrorOfOneComesWhenTheOtherHasEnded) {
   std::atomic<int> ended = 0;
   const auto fail = [](const char* what) { throw std::runtime_error(what); };
   const auto what_of = [&](const auto& aside, const auto& here) -> std::string {
@@ -46,12 +58,16 @@ TEST_P(Beside, AnErrorOfOneComesWhenTheOtherHasEnded) {
 
   EXPECT_EQ(what_of([&] { fail("aside"); }, [&] { ++ended; }), "aside");
   EXPECT_EQ(ended, 1);
-  EXPECT_EQ(what_of([&] { ++ended; }, [&] { fail("here"); }), "here");
+  const auto late = [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    ++ended;
+  };
+  EXPECT_EQ(what_of(late, [&] { fail("here"); }), "here");
   EXPECT_EQ(ended, 2);
   EXPECT_EQ(what_of([&] { fail("aside"); }, [&] { fail("here"); }), "here");
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, Beside, testing::Bool(), [](const auto& way) {
+INSTANTIATE_TEST_SUITE_P(Beside, BesideWays, testing::Bool(), [](const auto& way) {
   return way.param ? "OnAThreadOfItsOwn" : "OneAfterTheOther";
 });
 

@@ -166,32 +166,6 @@ TEST(Spinning, KeepsLinearMomentumAndNearlyAngularMomentum) {
   EXPECT_LT(fine, 0.35 * coarse);
 }
 
-/// Of a body that has turned for a while with one rotation update a step: how far its vertices lie,
-/// root mean square in m, from where many updates bring them.
-double lag_of_one_update(double step) {
-  constexpr double kDuration = 0.4;  // a third of a turn
-  constexpr int kMany = 10;
-  std::vector<double> ends[2];
-  for (const int updates : {1, kMany}) {
-    FreeBody body(step, {0.4, 1.5, 5}, updates);
-    for (int i = 0; i < static_cast<int>(std::lround(kDuration / step)); ++i) body.motion->step();
-    ends[updates == 1 ? 0 : 1] =
-        test::read(*body.backend, body.state.displacement, body.level().point.size());
-  }
-  double sum = 0;
-  for (std::size_t i = 0; i < ends[0].size(); ++i) sum += std::pow(ends[0][i] - ends[1][i], 2);
-  return std::sqrt(3 * sum / static_cast<double>(ends[0].size()));
-}
-
-// Rotations of u_n would be a whole step behind, an error of first order; those of where the body
-// is going are of second order at least.
-TEST(Spinning, RotationsOfOneUpdateDoNotLagBehind) {
-  const double coarse = lag_of_one_update(0.02), fine = lag_of_one_update(0.01);
-
-  std::printf("  lag %.3e m, and %.3e m at half the step\n", coarse, fine);
-  EXPECT_LT(fine, 0.3 * coarse);
-}
-
 // The last linear solve of a step goes to the tolerance, and those before it only as far as is
 // left when the rotations have moved.
 TEST(Spinning, EarlyUpdatesAreNotSolvedToTheEnd) {
