@@ -12,14 +12,13 @@ namespace kerf {
 /// Source  Fowler, Noll, Vo: 64 bits, offset basis and prime of theirs.
 class Hash {
  public:
-  void add(const void* bytes, std::size_t count) {
-    const auto* at = static_cast<const unsigned char*>(bytes);
-    for (std::size_t i = 0; i < count; ++i) value_ = (value_ ^ at[i]) * 0x100000001B3U;
-  }
   template <class T>
-  requires(std::is_floating_point_v<T> ||
-           std::has_unique_object_representations_v<T>) void add(const std::vector<T>& values) {
-    add(values.data(), values.size() * sizeof(T));
+  void add(const std::vector<T>& values) {
+    static_assert(std::is_floating_point_v<T> || std::has_unique_object_representations_v<T>,
+                  "bytes between members would be hashed");
+    const auto* at = reinterpret_cast<const unsigned char*>(values.data());
+    for (std::size_t i = 0; i < values.size() * sizeof(T); ++i)
+      value_ = (value_ ^ at[i]) * 0x100000001B3U;
   }
   std::uint64_t value() const { return value_; }
 

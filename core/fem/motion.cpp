@@ -110,13 +110,13 @@ NonlinearStats Motion::step() {
   begin_step();
   backend_.set_operator({1 + material_.stiffness_damping * velocity_factor(),
                          acceleration_factor() + material_.mass_damping * velocity_factor()});
-  double reference = 0, last = 0;  // residual before the first update, and before the last one
+  double reference = 0, previous = 0;  // residual before the first update, and the one just made
   for (int update = 0; update < setup_.rotation_updates; ++update) {
     backend_.rotate_cells(state_.displacement);
     const double before = residual(right_);
     if (update == 0) reference = before;  // later ones correct a remainder
-    if (update > 0 && last > 0) returned_[update - 1] = before / last;
-    last = before;
+    if (previous > 0) returned_[update - 1] = before / previous;
+    previous = before;
     double tolerance = setup_.tolerance;
     if (update + 1 < setup_.rotation_updates && reference > 0) {
       const double leave = std::min(kEarly, kOfReturned * returned_[update]);
