@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Each lane does what the shared bodies of kernels/ do for a scalar, eight cells at a time, and
+// Each lane does what the shared bodies of kernels/ do for a scalar, a pack of cells at a time, and
 // what follows a sum (residual, step of Chebyshev) is done while it is in registers.
 #include <omp.h>
 
@@ -107,8 +107,7 @@ void renumber(const std::vector<PatchMoves::Move>& moves, std::size_t size,
   for (std::size_t n = 0; n < moves.size(); ++n)
     for (std::size_t c = 0; c < 3; ++c)
       values[n][c] = std::exchange(vector[scalar_of(moves[n].from) + kGroup * c], T(0));
-  if (size > vector.capacity()) vector.reserve(with_room(size));
-  vector.resize(size, T(0));
+  resize_with_room(vector, size, T(0));
   for (std::size_t n = 0; n < moves.size(); ++n)
     for (std::size_t c = 0; c < 3; ++c) vector[scalar_of(moves[n].to) + kGroup * c] = values[n][c];
 }
@@ -139,7 +138,7 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
                            l == 0 ? nullptr : &moves, threads_, level.patched);
     level.bound = 0;
     const std::size_t size = kTileScalars * level.patched.tiles();
-    level.inverse_diagonal.assign(2 * size, 0);
+    resize_with_room(level.inverse_diagonal, 2 * size, S(0));  // made anew before it is used
     for (std::size_t x = 0; x < level.vectors.size(); ++x) {
       renumber(moves.vertices, size, level.vectors.held(x).single);
       renumber(moves.vertices, size, level.vectors.held(x).exact);
@@ -376,6 +375,8 @@ void FastBackend<S>::coarsen(int fine) {
     if (kind == kNoCells || kind == kIdle) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
+      const auto cells = packed.cell.begin() + kGroup * g + first;
+      if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) return;
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
       P out[kEntries];
       if (kind == kGeneral)
@@ -492,8 +493,11 @@ void read_lane(const Pack<double> (&full)[24][24], int lane, std::span<double> o
 
 template <class S>
 void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
+  std::int32_t cells[Pack<double>::kLanes];
+  std::fill(std::begin(cells), std::end(cells), -1);
+  cells[0] = cell;
   Pack<double> full[24][24];
-  read_matrices(level, {cell, -1, -1, -1}, full);
+  read_matrices(level, cells, full);
   read_lane(full, 0, out);
 }
 

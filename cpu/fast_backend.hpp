@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The fast backend: SIMD over eight cells, in double or with the cycle in single precision.
+// The fast backend: SIMD over cells side by side, in double or with the cycle in single precision.
 #pragma once
 
 #include <memory>

@@ -168,7 +168,7 @@ void FastBackend<S>::restrict_residual(int fine) {
     for (std::int32_t t = 0; t < to.tiles(); ++t) {
       const auto tile = static_cast<std::size_t>(t);
       for_packs<S>([&](int first) {
-        alignas(32) S sums[4 * Pack<S>::kLanes] = {};
+        alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};
         for (int k = 0; k < Pack<S>::kLanes; ++k)
           if (const std::int32_t v = to.patched.vertex[kGroup * tile + std::size_t(first + k)];
               v >= 0)
@@ -250,7 +250,7 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
   with_types(l.vectors[in], l.vectors[out], [&](const auto* from, auto* to) {
     using T = std::decay_t<decltype(*to)>;
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
-      alignas(32) S r[kTileScalars], z[kTileScalars];
+      alignas(kPackBytes) S r[kTileScalars], z[kTileScalars];
       for (std::size_t i = 0; i < kTileScalars; ++i)
         r[i] = static_cast<S>(from[kTileScalars * tile + i]);
       for_packs<S>([&](int first) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Diagonal blocks of groups of eight cells, added to points of their patch: loading and storing of
+// Diagonal blocks of groups of cells, added to points of their patch: loading and storing of
 // lanes, no loops over groups and no threads.
 #pragma once
 
@@ -104,7 +104,8 @@ struct GroupFold {
   const std::uint16_t* slots;  // points
 
   GroupFold(const PatchedLevel& level, const SlotTable<S>& table, std::size_t group, int first)
-      : slots(level.slots.data() + 64 * static_cast<std::size_t>(level.slots_at[group]) + first) {
+      : slots(level.slots.data() + 8 * kGroup * static_cast<std::size_t>(level.slots_at[group]) +
+              first) {
     const std::int32_t* cells = level.cell.data() + kGroup * group + first;
     for (int k = 0; k < Pack<S>::kLanes; ++k) {
       const std::size_t place = cells[k] < 0 ? 0 : table.place(level.level->fold[cells[k]]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// The bodies of kernels/ over groups of eight cells: loading and storing of lanes, no loops over
+// The bodies of kernels/ over groups of cells: loading and storing of lanes, no loops over
 // groups and no threads.
 #pragma once
 
@@ -39,7 +39,7 @@ struct FinestValues {
   std::vector<S> rotation;  // [group][w x y z][lane]
   std::vector<PackedMaterial<S>> materials;
 
-  /// Where w of a lane lies; the others follow in steps of eight.
+  /// Where w of a lane lies; the others follow in steps of a group.
   static std::size_t place(std::size_t lane) {
     return 4 * kGroup * (lane / kGroup) + lane % kGroup;
   }
@@ -62,6 +62,11 @@ struct FinestValues {
     return {load_pack(q), load_pack(q + kGroup), load_pack(q + 2 * kGroup),
             load_pack(q + 3 * kGroup)};
   }
+  /// Asks memory for those that are needed a few groups later.
+  void prefetch_behind(std::size_t group) const {
+    constexpr std::size_t kAhead = 4, kScalars = 4 * kGroup;
+    prefetch(rotation.data(), kScalars * (group + kAhead), kScalars);
+  }
   void set_quaternion(std::size_t group, int first_lane, const kernels::Quat<Pack<S>>& q) {
     S* to = rotation.data() + 4 * kGroup * group + first_lane;
     store_pack(to, q.w);
@@ -71,28 +76,27 @@ struct FinestValues {
   }
 };
 
-/// Points of a corner of a group: of all its lanes, or of half of them in double.
+/// Points of a corner of a group, of the lanes from `first` on.
 inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t group, int first,
                                           int corner) {
   return level.corners.data() + 8 * kGroup * group + kGroup * static_cast<std::size_t>(corner) +
          static_cast<std::size_t>(first);
 }
 
-/// The corners of a group, or of half of it in double. In rows they follow each other along x, so
-/// that two of them are read and written together and no numbers but the first are.
+/// The corners of the lanes of a pack. In rows they follow each other along x, so that two of them
+/// are read and written together, and no numbers but the first of a row are.
 /// Inlined, since arrays of packs that a call fills are cleared before.
+template <RowKind kKind, class S>
+inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
                                                   kernels::Vec3<Pack<S>> (&out)[8]) {
   for (int i = 0; i < 8; i += 2) {
-    const S* first = x + 4 * std::size_t(points[kGroup * i]);
     if constexpr (kKind == kScattered) {
       gather_points(x, points + kGroup * i, out[i]);
       gather_points(x, points + kGroup * (i + 1), out[i + 1]);
-    } else if constexpr (kKind == kTwoRows && std::is_same_v<S, float>) {
-      gather_rows(first, x + 4 * std::size_t(points[kGroup * i + 4]), out[i], out[i + 1]);
     } else {
-      gather_row(first, out[i], out[i + 1]);
+      gather_runs<kRunInPack<kKind, S>>(x, points + kGroup * i, out[i], out[i + 1]);
     }
   }
 }
@@ -100,22 +104,24 @@ template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void add_corners(const std::uint16_t* points,
                                                const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
   for (int i = 0; i < 8; i += 2) {
-    S* first = y + 4 * std::size_t(points[kGroup * i]);
     if constexpr (kKind == kScattered) {
       add_to_points(y, points + kGroup * i, f[i]);
       add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
-    } else if constexpr (kKind == kTwoRows && std::is_same_v<S, float>) {
-      add_to_rows(first, y + 4 * std::size_t(points[kGroup * i + 4]), f[i], f[i + 1]);
     } else {
-      add_to_row(first, f[i], f[i + 1]);
+      add_runs<kRunInPack<kKind, S>>(y, points + kGroup * i, f[i], f[i + 1]);
     }
   }
 }
 
 /// Calls body(points of the corners, how they lie, first lane) for each pack of a group.
+/// Bodies of products are flattened, all that they call inlined: the frames of what is not hold
+/// packs by the kilobyte, and with 512 bits loads waited for stores 4096 bytes away from them, at
+/// twice the time of a product.
 template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
-  const std::uint16_t* points = level.corners.data() + 8 * kGroup * group;
+  constexpr std::size_t kAhead = 4, kPoints = 8 * kGroup;
+  const std::uint16_t* points = level.corners.data() + kPoints * group;
+  prefetch(points, kPoints * kAhead, kPoints);
   const auto run = [&](auto kind) {
     for_packs<S>([&](int first) { body(points + first, kind, first); });
   };
@@ -124,6 +130,8 @@ void for_corners(const PatchedLevel& level, std::size_t group, const Body& body)
       return run(std::integral_constant<RowKind, kRow>{});
     case kTwoRows:
       return run(std::integral_constant<RowKind, kTwoRows>{});
+    case kFourRows:
+      return run(std::integral_constant<RowKind, kFourRows>{});
     default:
       return run(std::integral_constant<RowKind, kScattered>{});
   }
@@ -137,32 +145,36 @@ void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
   const CellKind& kind = level.kinds[level.kind[group]];
   const PackedMaterial<S>& material = values.materials[kind.material];
   const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
-  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
-    kernels::Vec3<P> at[8];
-    gather_corners<row()>(points, x, at);
-    const auto R = kernels::to_matrix(values.quaternion(group, first));
-    if (scale.mass == 0)
-      kernels::apply_cell(at, R, stiffness, material.modes.stiffness, at);
-    else
-      kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
-    add_corners<row()>(points, at, y);
-  });
+  values.prefetch_behind(group);
+  for_corners<S>(
+      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
+        kernels::Vec3<P> at[8];
+        gather_corners<row()>(points, x, at);
+        const auto R = kernels::to_matrix(values.quaternion(group, first));
+        if (scale.mass == 0)
+          kernels::apply_cell(at, R, stiffness, material.modes.stiffness, at);
+        else
+          kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
+        add_corners<row()>(points, at, y);
+      });
 }
 
 /// y += A x for a group of a stored level.
 template <class S>
 void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrices,
                      std::size_t group, const S* x, S* y) {
-  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
-    kernels::Vec3<Pack<S>> at[8];
-    gather_corners<row()>(points, x, at);
-    matrices.read(group, first, [&](const auto& entries, const Pack<S>& unit, auto translations) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
-        for (auto& v : at) v *= unit;
-      kernels::apply_mode_matrix<translations()>(entries, at, at);
-    });
-    add_corners<row()>(points, at, y);
-  });
+  for_corners<S>(
+      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
+        kernels::Vec3<Pack<S>> at[8];
+        gather_corners<row()>(points, x, at);
+        matrices.read(group, first,
+                      [&](const auto& entries, const Pack<S>& unit, auto translations) {
+                        if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
+                          for (auto& v : at) v *= unit;
+                        kernels::apply_mode_matrix<translations()>(entries, at, at);
+                      });
+        add_corners<row()>(points, at, y);
+      });
 }
 
 /// y += the elastic force of a group of level 0 displaced by x.
@@ -171,37 +183,31 @@ void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, st
                     const S* x, S* y) {
   using P = Pack<S>;
   const CellKind& kind = level.kinds[level.kind[group]];
-  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
-    kernels::Vec3<P> at[8];
-    gather_corners<row()>(points, x, at);
-    kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
-                           values.materials[kind.material].modes.stiffness, at);
-    add_corners<row()>(points, at, y);
-  });
+  values.prefetch_behind(group);
+  for_corners<S>(
+      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
+        kernels::Vec3<P> at[8];
+        gather_corners<row()>(points, x, at);
+        kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
+                               values.materials[kind.material].modes.stiffness, at);
+        add_corners<row()>(points, at, y);
+      });
 }
 
-/// Rotations of a group from the displacements, warm-started. Where Newton proves nothing within
-/// its steps, a lane goes the way of the reference. The packs of a group take their steps in turn,
-/// since each operation of a step waits for the one before.
+/// Two packs of rotations from mean gradients, warm-started: they take their steps in turn, since
+/// each operation of a step waits for the one before. Where Newton proves nothing within its steps,
+/// a lane goes the way of the reference.
 template <class S>
-void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_t group,
-                  const S* x) {
+[[gnu::flatten]] void rotate_two(const kernels::Mat3<Pack<S>>* F,
+                                 const kernels::Quat<Pack<S>>* start, kernels::Quat<Pack<S>>* q) {
   using P = Pack<S>;
-  constexpr int kIterations = 8, kPacks = kGroup / P::kLanes;
+  constexpr int kIterations = 8, kPacks = 2;
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
-  const P side = P(level.kinds[level.kind[group]].side);
-  kernels::Mat3<P> F[kPacks];
-  kernels::Quat<P> start[kPacks], q[kPacks];
   PackMask<S> proven[kPacks], lost[kPacks];
-  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
-    const int n = first / P::kLanes;
-    kernels::Vec3<P> corners[8];
-    gather_corners<row()>(points, x, corners);
-    F[n] = kernels::mean_gradient(corners, side);
-    start[n] = values.quaternion(group, first);
+  for (int n = 0; n < kPacks; ++n) {
     q[n] = kernels::normalised(start[n]);
     proven[n] = lost[n] = {P(S(1)).v < P(S(0)).v};
-  });
+  }
   for (int i = 0; i < kIterations; ++i) {
     bool done = true;
     for (int n = 0; n < kPacks; ++n) {
@@ -230,8 +236,29 @@ void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_
       q[n].y.set(k, turned.y);
       q[n].z.set(k, turned.z);
     }
-    values.set_quaternion(group, n * P::kLanes, q[n]);
   }
+}
+
+/// Rotations of a group from the displacements.
+template <class S>
+void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_t group,
+                  const S* x) {
+  using P = Pack<S>;
+  constexpr int kPacks = kGroup / P::kLanes;
+  static_assert(kPacks % 2 == 0);
+  const P side = P(level.kinds[level.kind[group]].side);
+  kernels::Mat3<P> F[kPacks];
+  kernels::Quat<P> start[kPacks], q[kPacks];
+  values.prefetch_behind(group);
+  for_corners<S>(
+      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
+        kernels::Vec3<P> corners[8];
+        gather_corners<row()>(points, x, corners);
+        F[first / P::kLanes] = kernels::mean_gradient(corners, side);
+        start[first / P::kLanes] = values.quaternion(group, first);
+      });
+  for (int n = 0; n < kPacks; n += 2) rotate_two<S>(F + n, start + n, q + n);
+  for (int n = 0; n < kPacks; ++n) values.set_quaternion(group, n * P::kLanes, q[n]);
 }
 
 /// w[i][m]: the value at point i of a child from those at the corners m of its parent.

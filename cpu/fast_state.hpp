@@ -108,7 +108,7 @@ template <class S>
 struct FastLevel {
   PatchedLevel patched;
   StoredMatrices<S> matrices;       // levels above 0
-  std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][8]
+  std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][kGroup]
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
@@ -122,6 +122,7 @@ struct FastLevel {
 
   /// D^-1 r of the vertices of a tile.
   Vec3<Pack<S>> times_inverse(std::size_t tile, int first, const Vec3<Pack<S>>& r) const {
+    if (first == 0) prefetch_tile(inverse_diagonal.data(), tile, 6);
     const S* d = inverse_diagonal.data() + 2 * kTileScalars * tile + first;
     const auto entry = [&](int e) { return load_pack(d + kGroup * e); };
     const Pack<S> xy = entry(1), xz = entry(2), yz = entry(4);
@@ -218,8 +219,8 @@ class FastBackend final : public Backend {
 #pragma omp parallel for num_threads(threads_) schedule(static) if (end - begin >= kWorthTiles)
     for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
   }
-  static constexpr std::int32_t kWorthGroups = 8;  // whose matrices are made
-  static constexpr std::int32_t kWorthTiles = 512;
+  static constexpr std::int32_t kWorthGroups = 4;  // whose matrices are made
+  static constexpr std::int32_t kWorthTiles = 256;
   static constexpr std::size_t kWorthCells = 2048;  // below, waking the threads costs more
   static constexpr std::int32_t kWorthScalars = 65536;
 

@@ -18,11 +18,15 @@
 
 namespace kerf::cpu {
 
+/// Fronts are padded to four rows, so packs are no wider where a register is.
+using FrontPack = Pack<double, 32>;
+inline FrontPack four_at(const double* from) { return load_pack<double, 32>(from); }
+
 /// A dense symmetric matrix by columns, of which the first `columns` are eliminated. Sizes are
 /// multiples of four, and columns begin `stride` scalars apart.
 class DenseFront {
  public:
-  using P = Pack<double>;
+  using P = FrontPack;
 
   DenseFront(double* values, int height, int columns, std::size_t stride)
       : values_(values), height_(height), columns_(columns), stride_(stride) {}
@@ -52,11 +56,11 @@ class DenseFront {
   void subtract_tile(int i, int j, int count) const {
     P sum[kPacks][4];
     for (int q = 0; q < 4; ++q)
-      for (int p = 0; p < kPacks; ++p) sum[p][q] = load_pack(column(j + q) + i + 4 * p);
+      for (int p = 0; p < kPacks; ++p) sum[p][q] = four_at(column(j + q) + i + 4 * p);
     for (int k = 0; k < count; ++k) {
       const double* const left = column(k);
       P at[kPacks];
-      for (int p = 0; p < kPacks; ++p) at[p] = load_pack(left + i + 4 * p);
+      for (int p = 0; p < kPacks; ++p) at[p] = four_at(left + i + 4 * p);
       for (int q = 0; q < 4; ++q) {
         const P factor = P(-left[j + q]);
         for (int p = 0; p < kPacks; ++p) sum[p][q] = fma(at[p], factor, sum[p][q]);
@@ -82,7 +86,7 @@ class DenseFront {
     for (int i = j + 4; i < height_; i += 4) {
       P x[4];
       for (int q = 0; q < 4; ++q) {
-        x[q] = load_pack(column(j + q) + i);
+        x[q] = four_at(column(j + q) + i);
         for (int k = 0; k < q; ++k) x[q] = fma(x[k], P(-column(j + k)[j + q]), x[q]);
         x[q] *= P(inverse[q]);
         store_pack(column(j + q) + i, x[q]);
@@ -99,7 +103,7 @@ class DenseFront {
 template <class S>
 class FrontFactor {
  public:
-  using P = Pack<double>;
+  using P = FrontPack;
 
   void analyse(const Level& level, const AssembledLevel& matrix) {
     fronts_ = Fronts(level, matrix);
@@ -301,7 +305,7 @@ class FrontFactor {
         factor[q] = P(-x[j + q]);
       }
       for (int i = j + 4; i < front.height(); i += 4) {
-        P sum = load_pack(x + i), entries;
+        P sum = four_at(x + i), entries;
         for (int q = 0; q < 4; ++q) {
           load_four(columns.at[q] + i, entries);
           sum = fma(entries, factor[q], sum);
@@ -316,7 +320,7 @@ class FrontFactor {
       const Columns columns = columns_at(front, j);
       P sum[4] = {P(0), P(0), P(0), P(0)};
       for (int i = j + 4; i < front.height(); i += 4) {
-        const P at = load_pack(x + i);
+        const P at = four_at(x + i);
         P entries;
         for (int q = 0; q < 4; ++q) {
           load_four(columns.at[q] + i, entries);

@@ -54,13 +54,6 @@ struct LevelStore {
   std::size_t bytes() const;
 };
 
-/// Room for what cuts append is reserved when an array is moved anyway.
-template <class T>
-void resize_with_room(std::vector<T>& array, std::size_t size, const T& value = {}) {
-  if (size > array.capacity()) array.reserve(with_room(size));
-  array.resize(size, value);
-}
-
 inline Vec load(const double* x, std::int32_t vertex) {
   const double* at = x + 3 * static_cast<std::size_t>(vertex);
   return {at[0], at[1], at[2]};

@@ -12,6 +12,7 @@ namespace {
 
 using Corners = Draft::Corners;
 constexpr std::int32_t kMostPoints = 0xFFFF;
+constexpr int kHalf = run_of(kTwoRows), kQuarter = run_of(kFourRows);
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
@@ -49,8 +50,8 @@ std::uint64_t key_of(const std::array<std::uint16_t, 4>& sorted) {
          std::uint64_t{sorted[2]} << 32 | std::uint64_t{sorted[3]} << 48;
 }
 
-/// Cells of a patch in groups. Of each kind those first that make rows of eight, then pairs of rows
-/// of four, then the others by fold.
+/// Cells of a patch in groups. Of each kind those first that make rows as long as a group, then
+/// those in rows of half that length, then of a quarter, then the others by fold.
 class Grouping {
  public:
   Grouping(const Level& level, Draft& draft, Numbering& numbering)
@@ -100,22 +101,32 @@ class Grouping {
     return true;
   }
 
+  /// What is left of whole groups goes to the next kind of them.
+  static void pass_on(std::vector<std::size_t>& from, std::vector<std::size_t>& to) {
+    const auto left = static_cast<std::ptrdiff_t>(from.size() % kGroup);
+    to.insert(to.end(), from.end() - left, from.end());
+    from.erase(from.end() - left, from.end());
+  }
+
   void group_kind(std::size_t begin, std::size_t end, std::uint16_t kind) {
-    std::vector<std::size_t> halves, rest;
+    std::vector<std::size_t> halves, quarters, rest;
     for (std::size_t i = begin; i < end;) {
       std::size_t run = 1;
       while (run < kGroup && i + run < end && continues(i + run - 1)) ++run;
-      if (run == kGroup)
-        for (std::size_t k = 0; k < run; ++k) put(i + k, kind, kRow);
-      else
-        for (std::size_t k = 0; k < run; ++k) (k < run / 4 * 4 ? halves : rest).push_back(i + k);
+      for (std::size_t k = 0; k < run; ++k) {
+        if (run == kGroup)
+          put(i + k, kind, kRow);
+        else if (k < run / kHalf * kHalf)
+          halves.push_back(i + k);
+        else
+          (k < run / kQuarter * kQuarter ? quarters : rest).push_back(i + k);
+      }
       i += run;
     }
-    if (halves.size() % kGroup != 0) {
-      rest.insert(rest.end(), halves.end() - 4, halves.end());
-      halves.erase(halves.end() - 4, halves.end());
-    }
+    pass_on(halves, quarters);
+    pass_on(quarters, rest);
     for (const std::size_t n : halves) put(n, kind, kTwoRows);
+    for (const std::size_t n : quarters) put(n, kind, kFourRows);
     const auto fold = [&](std::size_t n) { return level_.fold[cells_[n]]; };
     std::stable_sort(rest.begin(), rest.end(),
                      [&](std::size_t a, std::size_t b) { return fold(a) < fold(b); });
@@ -280,14 +291,16 @@ void Numbering::sort(Draft& draft) {
 }
 
 RowKind row_kind(const std::uint16_t* corners) {
-  bool halves = true, whole = true;
+  RowKind best = kRow;
   for (int i = 0; i < 8; i += 2)
     for (int k = 0; k < kGroup; ++k) {
       const std::uint16_t *a = corners + kGroup * i, *b = a + kGroup;
-      halves = halves && b[k] == a[k] + 1 && (k % 4 == 0 || a[k] == b[k - 1]);
-      whole = whole && (k != 4 || a[k] == b[k - 1]);
+      if (b[k] != a[k] + 1) return kScattered;
+      if (k == 0 || a[k] == b[k - 1]) continue;
+      if (k % kQuarter != 0) return kScattered;
+      best = std::min(best, k % kHalf != 0 ? kFourRows : kTwoRows);
     }
-  return !halves ? kScattered : whole ? kRow : kTwoRows;
+  return best;
 }
 
 void make_draft(const Level& level, Draft& draft, Numbering& numbering) {

@@ -29,7 +29,7 @@ struct Draft {
   std::int32_t first_point = 1, new_points = 0;  // 0 is kNothing
   std::vector<std::int32_t> cells;               // to be grouped; then per lane, -1: none
   std::vector<std::uint16_t> kind_of;            // of the cells to be grouped
-  std::vector<std::uint16_t> corners;            // [group][8][8]
+  std::vector<std::uint16_t> corners;            // [group][8][kGroup]
   std::vector<std::uint16_t> slots;              // the same, of the groups that are folded
   std::vector<std::uint8_t> folded;              // per group
   std::vector<std::uint8_t> row;                 // per group
@@ -122,7 +122,7 @@ class Numbering {
 /// Groups and numbers the cells of a draft.
 void make_draft(const Level& level, Draft& draft, Numbering& numbering);
 
-/// How the points of a group lie: [8][8] of corners.
+/// How the points of a group lie: [8][kGroup] of corners.
 RowKind row_kind(const std::uint16_t* corners);
 
 /// A number along a curve that stays within cubes.

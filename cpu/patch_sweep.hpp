@@ -44,15 +44,25 @@ Pack<S> tile_pack(const S* x, std::size_t tile, int component, int first) {
   return load_pack(x + kTileScalars * tile + kGroup * component + first);
 }
 
-/// The vectors of a tile, or of half of it in double.
+/// Asks for what a pass over tiles needs a few of them later: `scalars` of a vertex.
+template <class S>
+void prefetch_tile(const S* x, std::size_t tile, std::size_t scalars) {
+  constexpr std::size_t kAhead = 8;
+  const std::size_t size = kGroup * scalars;
+  prefetch<S>(x, size * (tile + kAhead), size);
+}
+
+/// The vectors of a tile, of the lanes from `first` on.
 template <class S>
 kernels::Vec3<Pack<S>> load_tile(const S* x, std::size_t tile, int first) {
+  if (first == 0) prefetch_tile(x, tile, 3);
   return {tile_pack(x, tile, 0, first), tile_pack(x, tile, 1, first), tile_pack(x, tile, 2, first)};
 }
 /// The same from a vector of any precision.
 template <class S, class From>
 kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) {
   typedef From Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(From))));
+  if (first == 0) prefetch_tile(x, tile, 3);
   kernels::Vec3<Pack<S>> out;
   for (int c = 0; c < 3; ++c) {
     Narrow narrow;
@@ -82,12 +92,15 @@ void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>&
   store_pack(to + 2 * kGroup, v.z);
 }
 
-/// Lane by lane in the order of the lanes.
-template <class S>
-double sum_lanes(const Pack<S>& pack) {
-  double sum = 0;
-  for (int k = 0; k < Pack<S>::kLanes; ++k) sum += static_cast<double>(pack[k]);
-  return sum;
+/// The sum of all lanes in double: of both halves, of halves of that, and so on.
+template <class S, int kBytes>
+double sum_lanes(const Pack<S, kBytes>& pack) {
+  constexpr int kLanes = Pack<S, kBytes>::kLanes;
+  double sums[kLanes];
+  for (int k = 0; k < kLanes; ++k) sums[k] = static_cast<double>(pack[k]);
+  for (int count = kLanes / 2; count > 0; count /= 2)
+    for (int k = 0; k < count; ++k) sums[k] += sums[k + count];
+  return sums[0];
 }
 template <class S>
 double dot_lanes(const kernels::Vec3<Pack<S>>& a, const kernels::Vec3<Pack<S>>& b) {
@@ -108,9 +121,10 @@ struct Sums {
 /// Zero where a component is held.
 template <class S>
 kernels::Vec3<Pack<S>> masked(kernels::Vec3<Pack<S>> v, const std::uint8_t* fixed) {
-  std::uint64_t any = 0;
-  std::memcpy(&any, fixed, Pack<S>::kLanes);
-  if (any == 0) return v;
+  std::uint64_t any[2] = {};
+  static_assert(Pack<S>::kLanes <= sizeof any);
+  std::memcpy(any, fixed, Pack<S>::kLanes);
+  if ((any[0] | any[1]) == 0) return v;
   for (int k = 0; k < Pack<S>::kLanes; ++k)
     for (int c = 0; c < 3; ++c)
       if ((fixed[k] >> c) & 1) v[c].set(k, S(0));
@@ -155,14 +169,7 @@ class PatchPoints {
   void load(const Own& own, const From* u) {
     for (std::size_t at = first_tile(); at < end_tile(); ++at)
       for_packs<S>([&](int first) { put_points(x_, own_points(at, first), own(at, first)); });
-    for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k) {
-      const From* from = u + scalar_of(level_.copy_vertex[k]);
-      S* to = x_ + 4 * std::size_t(level_.copy_point[k]);
-      to[0] = static_cast<S>(from[0]);
-      to[1] = static_cast<S>(from[kGroup]);
-      to[2] = static_cast<S>(from[2 * kGroup]);
-      to[3] = 0;
-    }
+    load_copies(u);
     interpolate_hanging();
     std::fill_n(x_ + 4 * std::size_t(kNothing), 4, S(0));
     std::fill_n(y_, 4 * std::size_t(patch_.points), S(0));
@@ -202,6 +209,21 @@ class PatchPoints {
     return level_.own_point.data() + kGroup * tile + first;
   }
 
+  // A function of its own: transfer_points.hpp says why.
+  template <class From>
+  [[gnu::noinline]] void load_copies(const From* u) {
+    const std::int32_t* const vertex = level_.copy_vertex.data();
+    const std::uint16_t* const point = level_.copy_point.data();
+    for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k) {
+      const From* from = u + scalar_of(vertex[k]);
+      S* to = x_ + 4 * std::size_t(point[k]);
+      to[0] = static_cast<S>(from[0]);
+      to[1] = static_cast<S>(from[kGroup]);
+      to[2] = static_cast<S>(from[2 * kGroup]);
+      to[3] = 0;
+    }
+  }
+
   void interpolate_hanging() {
     for (std::int32_t h = patch_.hanging.first; h < patch_.hanging.end(); ++h) {
       R of[4];
@@ -227,11 +249,11 @@ class PatchPoints {
   S* y_;
 };
 
-/// The sums of the n-th tile of shared vertices, or of half of it, over their copies.
+/// The sums of the n-th tile of shared vertices over their copies, of the lanes from `first` on.
 template <class S>
 kernels::Vec3<Pack<S>> shared_sums(const PatchedLevel& level, std::int32_t n, int first,
                                    const S* partial) {
-  alignas(32) S sums[4 * Pack<S>::kLanes] = {};
+  alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};
   const std::int32_t begin = kGroup * n + first;
   for (int k = 0; k < Pack<S>::kLanes && begin + k < level.shared; ++k)
     sum_records(level.copies(begin + k), partial, sums + 4 * k);

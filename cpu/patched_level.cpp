@@ -22,11 +22,12 @@ std::size_t bytes_of(const std::vector<T>& array) {
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
-/// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads.
+/// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads: more
+/// of them as long as they are not so small that most of their vertices are shared.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kMost = 4096, kLeast = 256, kPatches = 16;
+  constexpr std::int32_t kMost = 16384, kSmall = 2048, kLeast = 256;
   std::int32_t size = kMost;
-  while (size > kLeast && cells < kPatches * size) size /= 2;
+  while (size > kLeast && cells < (size > kSmall ? 32 : 16) * size) size /= 2;
   return size;
 }
 
@@ -279,7 +280,7 @@ class Patcher {
     return 2 * others <= cells && cells + work.arrived.size() <= most + most / 2 &&
            of(patch.points) <= points + points / 2 + 64 &&
            of(patch.points) + 8 * others <= kFewPoints &&
-           kGroup * of(patch.groups.size) <= cells + cells / 8 + 64 &&
+           kGroup * of(patch.groups.size) <= cells + cells / 8 + 8 * kGroup &&
            2 * of(patch.folded.size) <= 3 * of(patch.groups.size);
   }
 

@@ -4,14 +4,14 @@
 // its own short numbers for the points of its cells, so that a product with the matrix of a patch
 // runs in the cache and adds in a fixed order, whichever thread does it.
 //
-// Vertices  are numbered anew ("packed"), in tiles of eight: a tile has vertices of one patch
+// Vertices  are numbered anew ("packed"), in tiles of kGroup: a tile has vertices of one patch
 // alone, or
-//           shared ones; one that was shared stays so. Vectors are [tile][component][8]. What is
-//           left of a tile is nothing, which is zero and stays so.
+//           shared ones; one that was shared stays so. Vectors are [tile][component][kGroup]. What
+//           is left of a tile is nothing, which is zero and stays so.
 // Points    of a patch: first one that is nothing, then its vertices and its hanging corners by
 //           place, then those that came with cuts. A hanging corner is the mean of four of the
 //           points (each of two counts twice on an edge).
-// Cells     in groups of eight, one in each lane; a lane without a cell has the point that is
+// Cells     in groups of kGroup, one in each lane; a lane without a cell has the point that is
 //           nothing for corners. The cells of a group are of one kind.
 //
 // Cuts and hanging corners need nothing beyond the numbers of points. After a cut, cells that have
@@ -32,7 +32,8 @@
 
 namespace kerf::cpu {
 
-inline constexpr int kGroup = 8;
+/// Cells of a group and vertices of a tile: those of the widest pack.
+inline constexpr int kGroup = 16;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
 /// The point of every patch that is nothing: zero, and never read.
 inline constexpr std::uint16_t kNothing = 0;
@@ -56,9 +57,17 @@ enum HeldCell : std::uint8_t { kFree, kPartlyHeld, kWhollyHeld };
 /// How the points of a group lie.
 enum RowKind : std::uint8_t {
   kScattered,
-  kTwoRows,  ///< each half of the group is a row: cells side by side along x, points in order
-  kRow       ///< the whole group is one
+  kFourRows,  ///< each quarter of the group is a row: cells side by side along x, points in order
+  kTwoRows,   ///< each half is
+  kRow        ///< the whole group is one
 };
+/// Cells in a row of such a group; 1 where there are none.
+constexpr int run_of(RowKind kind) {
+  return kind == kScattered  ? 1
+         : kind == kFourRows ? kGroup / 4
+         : kind == kTwoRows  ? kGroup / 2
+                             : kGroup;
+}
 
 /// The part of an array that belongs to one patch. What lies between its size and its room is not
 /// read.
@@ -130,12 +139,12 @@ struct PatchedLevel {
 
   std::vector<std::int32_t> cell;      // per lane, -1: none
   std::vector<std::int32_t> lane;      // per cell
-  std::vector<std::uint16_t> corners;  // [group][8][8]: points
+  std::vector<std::uint16_t> corners;  // [group][8][kGroup]: points
   std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
   std::vector<std::uint8_t> row;       // per group: RowKind
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
   std::vector<std::int32_t> patch_of;  // per group, -1: none
-  std::vector<std::uint16_t> slots;    // [folded group][8][8]: points
+  std::vector<std::uint16_t> slots;    // [folded group][8][kGroup]: points
 
   std::vector<std::int32_t> vertex;      // per packed vertex: that of the level, -1: none
   std::vector<std::int32_t> packed;      // per vertex of the level
@@ -153,7 +162,7 @@ struct PatchedLevel {
 
   Transfer transfer;                   // to the next level
   std::vector<std::uint8_t> held;      // per cell: HeldCell, of it or of the cells below
-  std::vector<std::int32_t> children;  // [group][octant][8], above level 0: lanes of the level
+  std::vector<std::int32_t> children;  // [group][octant][kGroup], above level 0: lanes of the level
                                        // before, -1: none, or wholly held; passed: octant 0
   std::size_t groups_built = 0, tiles_built = 0;  // when patches were last made from nothing
 
@@ -185,7 +194,7 @@ struct PatchedLevel {
   std::size_t bytes() const;
 };
 
-/// Where component 0 of a packed vertex lies in a vector; the others follow in steps of eight.
+/// Where component 0 of a packed vertex lies in a vector; the others follow in steps of kGroup.
 inline std::size_t scalar_of(std::int32_t packed) {
   const auto v = static_cast<std::size_t>(packed);
   return kTileScalars * (v / kGroup) + v % kGroup;

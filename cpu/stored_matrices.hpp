@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The cell matrices of a stored level in the basis of modes (kernels/mode_coarsen.hpp), eight cells
-// side by side.
+// The cell matrices of a stored level in the basis of modes (kernels/mode_coarsen.hpp), the
+// cells of a group side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
@@ -23,74 +23,118 @@
 
 namespace kerf::cpu {
 
-/// Eight integers as scalars.
+/// Integers as scalars.
 inline Pack<float> widened(const std::int16_t* from) {
-#if defined(__AVX2__) && defined(__FMA__)
+#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+  const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+  return Pack<float>::Vector(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(codes)));
+#elif defined(__AVX2__) && defined(__FMA__)
   const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
   return Pack<float>::Vector(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(codes)));
 #else
   Pack<float> out;
-  for (int k = 0; k < 8; ++k) out.set(k, static_cast<float>(from[k]));
+  for (int k = 0; k < Pack<float>::kLanes; ++k) out.set(k, static_cast<float>(from[k]));
   return out;
 #endif
 }
 
 /// The nearest integers, even ones in the middle.
 inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
-#if defined(__AVX2__) && defined(__FMA__)
+#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to),
+                      _mm512_cvtsepi32_epi16(_mm512_cvtps_epi32(__m512(x.v))));
+#elif defined(__AVX2__) && defined(__FMA__)
   const __m256i codes = _mm256_cvtps_epi32(__m256(x.v));
   _mm_storeu_si128(
       reinterpret_cast<__m128i*>(to),
       _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1)));
 #else
-  for (int k = 0; k < 8; ++k) to[k] = static_cast<std::int16_t>(std::lrint(x[k]));
+  for (int k = 0; k < Pack<float>::kLanes; ++k) to[k] = static_cast<std::int16_t>(std::lrint(x[k]));
 #endif
 }
 
-/// One entry of eight cells.
-struct alignas(16) CodeLanes {
-  std::int16_t at[8];
+/// One entry of the cells in a pack.
+struct alignas(kPackBytes / 2) CodeLanes {
+  std::int16_t at[Pack<float>::kLanes];
 };
 
-/// Brings some lanes of eight codes to lanes of others.
+/// Brings some lanes of the codes of a group to lanes of a pack.
 class LanePicker {
  public:
+#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
   void pick(int to, int from) {
-    bytes_[2 * to] = static_cast<std::uint8_t>(2 * from);
-    bytes_[2 * to + 1] = static_cast<std::uint8_t>(2 * from + 1);
+    from_[to] = static_cast<std::int16_t>(from);
+    picks_ |= static_cast<__mmask16>(1U << to);
   }
   /// Where it picks none, zero if this is the first, else what was there.
   void add(const std::int16_t* from, bool first, CodeLanes& to) const {
-#if defined(__AVX2__) && defined(__FMA__)
-    auto* out = reinterpret_cast<__m128i*>(to.at);
-    const __m128i order = _mm_load_si128(reinterpret_cast<const __m128i*>(bytes_));
-    const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
-    const __m128i picked = _mm_shuffle_epi8(codes, order);
-    _mm_store_si128(out, first ? picked : _mm_or_si128(picked, _mm_load_si128(out)));
-#else
-    for (int k = 0; k < 8; ++k) {
-      if (bytes_[2 * k] != kZero)
-        to.at[k] = from[bytes_[2 * k] / 2];
-      else if (first)
-        to.at[k] = 0;
-    }
-#endif
+    auto* out = reinterpret_cast<__m256i*>(to.at);
+    const __m256i order = _mm256_load_si256(reinterpret_cast<const __m256i*>(from_));
+    const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+    const __m256i before = first ? _mm256_setzero_si256() : _mm256_load_si256(out);
+    _mm256_store_si256(out, _mm256_mask_permutexvar_epi16(before, picks_, order, codes));
   }
 
  private:
-  static constexpr std::uint8_t kZero = 0x80;
-  alignas(16) std::uint8_t bytes_[16] = {kZero, kZero, kZero, kZero, kZero, kZero, kZero, kZero,
-                                         kZero, kZero, kZero, kZero, kZero, kZero, kZero, kZero};
+  __mmask16 picks_ = 0;
+  alignas(32) std::int16_t from_[16] = {};
+#elif defined(__AVX2__) && defined(__FMA__)
+  LanePicker() { std::fill_n(bytes_[0], sizeof bytes_, std::uint8_t{0x80}); }  // zero
+  void pick(int to, int from) {
+    std::uint8_t* const bytes = bytes_[from / 8] + 2 * to;
+    bytes[0] = static_cast<std::uint8_t>(2 * (from % 8));
+    bytes[1] = static_cast<std::uint8_t>(bytes[0] + 1);
+  }
+  /// Where it picks none, zero if this is the first, else what was there.
+  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
+    auto* out = reinterpret_cast<__m128i*>(to.at);
+    const auto half = [&](int n) {
+      const __m128i order = _mm_load_si128(reinterpret_cast<const __m128i*>(bytes_[n]));
+      const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from + 8 * n));
+      return _mm_shuffle_epi8(codes, order);
+    };
+    const __m128i picked = _mm_or_si128(half(0), half(1));
+    _mm_store_si128(out, first ? picked : _mm_or_si128(picked, _mm_load_si128(out)));
+  }
+
+ private:
+  alignas(16) std::uint8_t bytes_[kGroup / 8][16];
+#else
+  LanePicker() { std::fill(std::begin(from_), std::end(from_), -1); }
+  void pick(int to, int from) { from_[to] = from; }
+  /// Where it picks none, zero if this is the first, else what was there.
+  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
+    for (int k = 0; k < Pack<float>::kLanes; ++k) {
+      if (from_[k] >= 0)
+        to.at[k] = from[from_[k]];
+      else if (first)
+        to.at[k] = 0;
+    }
+  }
+
+ private:
+  int from_[Pack<float>::kLanes];
+#endif
 };
 
+/// Entries of a group as packs. Each read asks memory for what lies where the same entry of the
+/// next group mostly does: all of it at once, before the product, gained nothing.
 template <class S>
 struct PlainEntries {
   const S* from;
-  Pack<S> operator[](int entry) const { return load_pack(from + kGroup * entry); }
+  Pack<S> operator[](int entry) const {
+    prefetch(from, kGroup * static_cast<std::size_t>(entry + kernels::kModeEntries),
+             Pack<S>::kLanes);
+    return load_pack(from + kGroup * entry);
+  }
 };
 struct CodedEntries {
   const std::int16_t* from;
-  Pack<float> operator[](int entry) const { return widened(from + kGroup * entry); }
+  Pack<float> operator[](int entry) const {
+    if (entry % 2 == 0)
+      prefetch(from, kGroup * static_cast<std::size_t>(entry + kernels::kModeEntries), 1);
+    return widened(from + kGroup * entry);
+  }
 };
 
 template <class S>
@@ -134,7 +178,7 @@ class StoredMatrices {
       for (int e = 0; e < count; ++e) store_pack(to + kGroup * e, entries[e]);
       return;
     }
-    if constexpr (std::is_same_v<S, float>) encode(group, count, entries);
+    if constexpr (std::is_same_v<S, float>) encode(group, first, count, entries);
   }
 
   /// body(entries, unit, translations): matrices are the entries times the unit; the last says in
@@ -150,24 +194,35 @@ class StoredMatrices {
     const std::size_t at = kGroup * std::size_t{begin_[group]};
     if constexpr (std::is_same_v<S, float>)
       if (is_coded(group))
-        return with(CodedEntries{codes_.data() + at}, load_pack(unit_.data() + kGroup * group));
+        return with(CodedEntries{codes_.data() + at + first},
+                    load_pack(unit_.data() + kGroup * group + static_cast<std::size_t>(first)));
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored.
+  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored. Entry
+  /// by entry, so that those of the lanes come from memory side by side.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     int count = 0;
     if constexpr (std::is_same_v<S, float>) count = gather_codes(lanes, out);
     std::fill(out + count, out + kernels::kEntries, P(0));
+    struct Plain {
+      int lane, count;
+      const S* from;
+    } plain[P::kLanes];
+    int size = 0, most = 0;
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const auto lane = static_cast<std::size_t>(lanes[k]);
       const std::size_t group = lane / kGroup;
       if ((traits_[group] & (kNone | kCoded)) != 0) continue;
-      const S* from = plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup;
-      for (int e = 0; e < entries_of(group); ++e)
-        out[e].set(k, from[kGroup * static_cast<std::size_t>(e)]);
+      plain[size++] = {k, entries_of(group),
+                       plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup};
+      most = std::max(most, entries_of(group));
     }
+    for (int e = 0; e < most; ++e)
+      for (int n = 0; n < size; ++n)
+        if (e < plain[n].count)
+          out[e].set(plain[n].lane, plain[n].from[kGroup * static_cast<std::size_t>(e)]);
   }
 
  private:
@@ -180,33 +235,31 @@ class StoredMatrices {
   /// What gather does for lanes with codes, group by group, since cells side by side mostly have
   /// parents side by side; zero in the others. Returns how many entries it wrote.
   int gather_codes(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
-    CodeLanes codes[kernels::kEntries];
+    LanePicker pickers[P::kLanes];
+    const std::int16_t* from[P::kLanes];
     alignas(kPackBytes) S unit[P::kLanes] = {};
-    int count = 0;
+    int groups = 0, count = 0;
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const std::size_t group = static_cast<std::size_t>(lanes[k]) / kGroup;
       if (!is_coded(group) || (traits_[group] & kNone) != 0) continue;
       unit[k] = unit_[static_cast<std::size_t>(lanes[k])];
-      bool seen = false;  // this group came with an earlier lane
-      for (int j = 0; j < k; ++j)
-        seen = seen || (lanes[j] >= 0 && static_cast<std::size_t>(lanes[j]) / kGroup == group);
-      if (seen) continue;
-      LanePicker picker;
-      for (int j = k; j < P::kLanes; ++j)
-        if (lanes[j] >= 0 && static_cast<std::size_t>(lanes[j]) / kGroup == group)
-          picker.pick(j, lanes[j] % kGroup);
-      const std::int16_t* from = codes_.data() + kGroup * std::size_t{begin_[group]};
-      const bool first = count == 0;
+      const std::int16_t* const its = codes_.data() + kGroup * std::size_t{begin_[group]};
+      const auto n = static_cast<int>(std::find(from, from + groups, its) - from);
+      if (n == groups) from[groups++] = its;
+      pickers[n].pick(k, lanes[k] % kGroup);
       count = entries_of(group);  // of all groups with codes alike
-      for (int e = 0; e < count; ++e) picker.add(from + kGroup * e, first, codes[e]);
     }
     const P units = load_pack(unit);
-    for (int e = 0; e < count; ++e) out[e] = units * widened(codes[e].at);
+    for (int e = 0; e < count; ++e) {
+      CodeLanes codes;
+      for (int n = 0; n < groups; ++n) pickers[n].add(from[n] + kGroup * e, n == 0, codes);
+      out[e] = units * widened(codes.at);
+    }
     return count;
   }
 
-  void encode(std::size_t group, int count, const P (&entries)[kernels::kEntries]) {
+  void encode(std::size_t group, int first, int count, const P (&entries)[kernels::kEntries]) {
     // Several at a time, since each waits for the one before.
     P sizes[4] = {P(0), P(0), P(0), P(0)};
     int done = 0;
@@ -218,8 +271,8 @@ class StoredMatrices {
     const P none = P(S(1e-30));
     const P unit = select(greatest > none, greatest, none) * P(S(1) / S(32767));
     const P inverse = P(S(1)) / unit;
-    store_pack(unit_.data() + kGroup * group, unit);
-    std::int16_t* to = codes_.data() + kGroup * std::size_t{begin_[group]};
+    store_pack(unit_.data() + kGroup * group + first, unit);
+    std::int16_t* to = codes_.data() + kGroup * std::size_t{begin_[group]} + first;
     for (int e = 0; e < count; ++e) store_narrowed(to + kGroup * e, entries[e] * inverse);
   }
 

@@ -13,7 +13,8 @@
 
 namespace kerf::cpu {
 
-/// At most one of a thread at a time: they share its buffers.
+/// At most one of a thread at a time: they share its buffers. Its loops are functions of their own
+/// where sweeps call them: among all that a sweep holds, GCC 12 keeps their counters in vectors.
 template <class S>
 class TransferPoints {
  public:
@@ -29,7 +30,7 @@ class TransferPoints {
   }
 
   /// The points, from a vector of the next level.
-  void load(const PatchedLevel& next, const S* u) {
+  [[gnu::noinline]] void load(const PatchedLevel& next, const S* u) {
     S* to = x_;
     for (std::int32_t k = part_.points.first; k < part_.points.end(); ++k, to += 4) {
       const S* from = u + scalar_of(next.packed[transfer_.point[k]]);
@@ -42,27 +43,18 @@ class TransferPoints {
 
   /// What the points give to own vertices.
   kernels::Vec3<Pack<S>> taken(std::size_t tile, int first) const {
-    alignas(32) S sums[4 * Pack<S>::kLanes];
-    const std::uint8_t* terms = transfer_.terms.data() + kGroup * tile;
-    std::size_t term = static_cast<std::size_t>(transfer_.first_term[tile]);
-    for (int k = 0; k < first; ++k) term += terms[k];
-    for (int k = 0; k < Pack<S>::kLanes; ++k) {
-      R sum;
-      take(term, terms[first + k], sum);
-      term += terms[first + k];
-      __builtin_memcpy(sums + 4 * k, &sum, sizeof sum);
-    }
+    alignas(kPackBytes) S sums[4 * Pack<S>::kLanes];
+    take(tile, first, sums);
     return gathered(static_cast<const S*>(sums));
   }
 
   /// Adds it to the shared vertices of the part, where they are not held.
   void add_to_leads(S* u) const {
-    std::size_t term = static_cast<std::size_t>(part_.first_lead_term);
+    Terms from = takes(static_cast<std::size_t>(part_.first_lead_term));
     for (std::int32_t n = part_.leads.first; n < part_.leads.end(); ++n) {
       const std::int32_t v = transfer_.lead[n];
       R sum;
-      take(term, transfer_.lead_terms[n], sum);
-      term += transfer_.lead_terms[n];
+      from.take(transfer_.lead_terms[n], sum);
       S* to = u + scalar_of(v);
       for (std::size_t c = 0; c < 3; ++c)
         if (((level_.fixed[v] >> c) & 1) == 0) to[kGroup * c] += sum[c];
@@ -71,23 +63,60 @@ class TransferPoints {
 
   /// The other way: what the vertices give to the points, from a vector, by point.
   void give(const S* r, S* out) {
-    const S* const rows = rows_of(r);
-    std::size_t term = static_cast<std::size_t>(part_.terms.first);
+    const auto first = static_cast<std::size_t>(part_.terms.first);
+    Terms from{rows_of(r), weights_, transfer_.given_row.data() + first,
+               transfer_.given_weight.data() + first};
     for (std::int32_t k = part_.points.first; k < part_.points.end(); ++k) {
       // In turn to two sums, so that the second need not wait for the first.
       R even{}, odd{};
-      const std::size_t end = term + transfer_.point_terms[k];
-      for (; term + 1 < end; term += 2) {
-        add_given(rows, term, even);
-        add_given(rows, term + 1, odd);
+      const int count = transfer_.point_terms[k];
+      for (int n = 0; n + 1 < count; n += 2) {
+        from.add(even);
+        from.add(odd);
       }
-      if (term < end) add_given(rows, term++, even);
+      if (count % 2 != 0) from.add(even);
       even += odd;
       __builtin_memcpy(out + 4 * static_cast<std::size_t>(k), &even, sizeof even);
     }
   }
 
  private:
+  /// Records and their weights, one after the other. Holds what it reads by itself, so that a loop
+  /// need not ask for it again behind each store.
+  struct Terms {
+    const S *records, *weights;
+    const std::uint16_t* which;
+    const std::uint8_t* code;
+
+    void skip(int count) {
+      which += count;
+      code += count;
+    }
+    void add(R& sum) {
+      R one, weight;
+      __builtin_memcpy(&one, records + 4 * std::size_t(*which++), sizeof one);
+      __builtin_memcpy(&weight, weights + 4 * std::size_t(*code++), sizeof weight);
+      sum += weight * one;
+    }
+    void take(int count, R& sum) {
+      sum = R{};
+      for (int n = 0; n < count; ++n) add(sum);
+    }
+  };
+  [[gnu::noinline]] void take(std::size_t tile, int first, S* sums) const {
+    const std::uint8_t* terms = transfer_.terms.data() + kGroup * tile;
+    Terms from = takes(static_cast<std::size_t>(transfer_.first_term[tile]));
+    for (int k = 0; k < first; ++k) from.skip(terms[k]);
+    for (int k = 0; k < Pack<S>::kLanes; ++k, sums += 4) {
+      R sum;
+      from.take(terms[first + k], sum);
+      __builtin_memcpy(sums, &sum, sizeof sum);
+    }
+  }
+  Terms takes(std::size_t term) const {
+    return {x_, weights_, transfer_.term_point.data() + term, transfer_.term_weight.data() + term};
+  }
+
   /// Weights in all components, by their code.
   static const S* weights() {
     struct Table {
@@ -99,25 +128,6 @@ class TransferPoints {
     };
     static const Table table;
     return table.w[0];
-  }
-
-  void take(std::size_t term, std::uint8_t count, R& sum) const {
-    sum = R{};
-    for (const std::size_t end = term + count; term < end; ++term) {
-      R one, weight;
-      __builtin_memcpy(&one, x_ + 4 * std::size_t(transfer_.term_point[term]), sizeof one);
-      __builtin_memcpy(&weight, weights_ + 4 * std::size_t(transfer_.term_weight[term]),
-                       sizeof weight);
-      sum += weight * one;
-    }
-  }
-
-  void add_given(const S* rows, std::size_t term, R& sum) const {
-    R one, weight;
-    __builtin_memcpy(&one, rows + 4 * std::size_t(transfer_.given_row[term]), sizeof one);
-    __builtin_memcpy(&weight, weights_ + 4 * std::size_t(transfer_.given_weight[term]),
-                     sizeof weight);
-    sum += weight * one;
   }
 
   /// The vertices of the part, own ones first, as records.

@@ -20,6 +20,13 @@ namespace kerf {
 /// What to reserve for an array that cuts make longer: pages that are never touched cost nothing.
 inline std::size_t with_room(std::size_t size) { return size + size / 4 + 16; }
 
+/// Room for what cuts append is reserved when an array is moved anyway.
+template <class T>
+void resize_with_room(std::vector<T>& array, std::size_t size, const T& value = {}) {
+  if (size > array.capacity()) array.reserve(with_room(size));
+  array.resize(size, value);
+}
+
 struct RowState {
   std::vector<std::int32_t> count;  ///< empty: packed
   std::int32_t packed_end = 0;      ///< rows that start before have no room to grow

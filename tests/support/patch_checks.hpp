@@ -95,7 +95,7 @@ inline void expect_corners_in_place(const PatchedLevel& l) {
     for (std::size_t k = 0; k < kGroup; ++k) {
       const std::int32_t c = l.cell[kGroup * g + k];
       for (std::size_t i = 0; i < 8; ++i) {
-        const std::uint16_t point = l.corners[64 * g + 8 * i + k];
+        const std::uint16_t point = l.corners[8 * kGroup * g + kGroup * i + k];
         if (c < 0) {
           EXPECT_EQ(point, cpu::kNothing);
           continue;
@@ -123,28 +123,28 @@ inline void expect_slots(const PatchedLevel& l) {
   std::vector<std::vector<std::int32_t>> vertices;
   for (const Patch& patch : l.patches) vertices.push_back(vertices_of(l, patch));
   for_groups(l, [&](std::int32_t p, std::size_t g) {
-    const std::uint16_t* at =
-        l.folded(g) ? l.slots.data() + 64 * std::size_t(l.slots_at[g]) : l.corners.data() + 64 * g;
+    const std::uint16_t* at = l.folded(g) ? l.slots.data() + 8 * kGroup * std::size_t(l.slots_at[g])
+                                          : l.corners.data() + 8 * kGroup * g;
     for (std::size_t k = 0; k < kGroup; ++k) {
       const std::int32_t c = l.cell[kGroup * g + k];
       if (c < 0) continue;
       for (std::size_t i = 0; i < 8; ++i)
-        ASSERT_EQ(vertices[p][at[8 * i + k]], l.level->slots[c][i]);
+        ASSERT_EQ(vertices[p][at[kGroup * i + k]], l.level->slots[c][i]);
     }
   });
 }
 
-/// The points of a row follow each other; those of pairs of rows do in each half.
+/// The points of a row follow each other: of the whole group, or of halves or quarters of it.
 inline void expect_rows(const PatchedLevel& l) {
   for_groups(l, [&](std::int32_t, std::size_t g) {
-    const std::uint16_t* corners = l.corners.data() + 64 * g;
+    const std::uint16_t* corners = l.corners.data() + 8 * kGroup * g;
     if (l.row[g] == cpu::kScattered) return;
+    const int run = cpu::run_of(cpu::RowKind(l.row[g]));
     for (int i = 0; i < 8; i += 2)
       for (int k = 0; k < kGroup; ++k) {
-        EXPECT_EQ(corners[8 * (i + 1) + k], corners[8 * i + k] + 1);
-        const bool starts = k == 0 || (k == 4 && l.row[g] == cpu::kTwoRows);
-        if (!starts) {
-          EXPECT_EQ(corners[8 * i + k], corners[8 * i + k - 1] + 1);
+        EXPECT_EQ(corners[kGroup * (i + 1) + k], corners[kGroup * i + k] + 1);
+        if (k % run != 0) {
+          EXPECT_EQ(corners[kGroup * i + k], corners[kGroup * i + k - 1] + 1);
         }
       }
   });
@@ -188,7 +188,8 @@ inline void expect_nothing_left(const PatchedLevel& l) {
       const bool empty = l.cell[kGroup * g + k] < 0;
       EXPECT_TRUE(empty || used[g]) << "group " << g;
       for (std::size_t octant = 0; octant < 8 && empty && !l.children.empty(); ++octant)
-        ASSERT_EQ(l.children[64 * g + kGroup * octant + k], -1) << "group " << g << ", lane " << k;
+        ASSERT_EQ(l.children[8 * kGroup * g + kGroup * octant + k], -1)
+            << "group " << g << ", lane " << k;
     }
   }
 }
@@ -209,7 +210,8 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
     EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || kind == cpu::kGeneral, kind >= cpu::kHeldMerged);
     if (kind == cpu::kGeneral) continue;
     for (std::size_t o = 0; o < 8; ++o)
-      if (const std::int32_t at = l.children[64 * (lane / kGroup) + kGroup * o + lane % kGroup];
+      if (const std::int32_t at =
+              l.children[8 * kGroup * (lane / kGroup) + kGroup * o + lane % kGroup];
           at >= 0)
         found.insert(at);
     ASSERT_EQ(found, expected);

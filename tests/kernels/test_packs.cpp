@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+//
+// What brings points into the lanes of packs and back, against loops over single lanes.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "cpu/patched_level.hpp"
+#include "cpu/stored_matrices.hpp"
+
+namespace kerf {
+namespace {
+
+using cpu::Pack;
+using kernels::Vec3;
+
+/// Records with other values in every component, the fourth zero.
+template <class S>
+struct Records {
+  alignas(64) S s[4 * 64] = {};
+
+  explicit Records(int first) {
+    for (int n = 0; n < 64; ++n)
+      for (int c = 0; c < 3; ++c) s[4 * n + c] = static_cast<S>(first + 10 * n + c);
+  }
+  S at(int point, int c) const { return s[4 * point + c]; }
+};
+
+template <class S>
+Vec3<Pack<S>> numbers(int first) {
+  Vec3<Pack<S>> out;
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    for (int c = 0; c < 3; ++c) out[c].set(k, static_cast<S>(first + 7 * k + 100 * c));
+  return out;
+}
+
+template <class S>
+class PointsOfPacks : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(PointsOfPacks, Scalars);
+
+TYPED_TEST(PointsOfPacks, AreGatheredFromAnywhere) {
+  using S = TypeParam;
+  const Records<S> x(3);
+  std::array<std::uint16_t, Pack<S>::kLanes> at;
+  for (std::size_t k = 0; k < at.size(); ++k) at[k] = static_cast<std::uint16_t>((37 * k + 5) % 64);
+
+  const Vec3<Pack<S>> anywhere = cpu::gathered(x.s, at.data()), in_order = cpu::gathered(x.s + 8);
+
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(anywhere[c][k], x.at(at[k], c));
+      EXPECT_EQ(in_order[c][k], x.at(2 + k, c));
+    }
+}
+
+TYPED_TEST(PointsOfPacks, ComeBackAsRecordsInTheOrderOfTheLanes) {
+  using S = TypeParam;
+  const Vec3<Pack<S>> v = numbers<S>(1);
+  int next = 0;
+
+  cpu::for_records(v, [&](int lane, const typename cpu::Record<S>::Vector& record) {
+    EXPECT_EQ(lane, next++);
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(record[c], v[c][lane]);
+    EXPECT_EQ(record[3], S(0));
+  });
+
+  EXPECT_EQ(next, Pack<S>::kLanes);
+}
+
+TYPED_TEST(PointsOfPacks, ThatSeveralLanesMeetGetTheSumOfAll) {
+  using S = TypeParam;
+  Records<S> y(0);
+  const Records<S> before(0);
+  const Vec3<Pack<S>> v = numbers<S>(1);
+  std::array<std::uint16_t, Pack<S>::kLanes> at;
+  for (std::size_t k = 0; k < at.size(); ++k) at[k] = static_cast<std::uint16_t>(9 + k % 3);
+
+  cpu::add_to_points(y.s, at.data(), v);
+
+  for (int p = 0; p < 64; ++p)
+    for (int c = 0; c < 3; ++c) {
+      S expected = before.at(p, c);
+      for (int k = 0; k < Pack<S>::kLanes; ++k)
+        if (at[k] == p) expected += v[c][k];
+      EXPECT_EQ(y.at(p, c), expected);
+    }
+}
+
+/// Rows of kRun cells that begin at several points.
+template <int kRun, class S>
+void expect_runs(const std::vector<std::uint16_t>& begins) {
+  constexpr int kLanes = Pack<S>::kLanes;
+  std::array<std::uint16_t, kLanes> at;
+  for (int k = 0; k < kLanes; ++k) at[k] = static_cast<std::uint16_t>(begins[k / kRun] + k % kRun);
+  const Records<S> x(3), before(1);
+  Records<S> y(1);
+  Vec3<Pack<S>> left, right;
+  const Vec3<Pack<S>> f = numbers<S>(1), g = numbers<S>(5);
+
+  cpu::gather_runs<kRun>(x.s, at.data(), left, right);
+  cpu::add_runs<kRun>(y.s, at.data(), f, g);
+
+  std::array<std::array<S, 3>, 64> sum{};
+  for (int k = 0; k < kLanes; ++k)
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(left[c][k], x.at(at[k], c));
+      EXPECT_EQ(right[c][k], x.at(at[k] + 1, c));
+      sum[at[k]][c] += f[c][k];
+      sum[at[k] + 1][c] += g[c][k];
+    }
+  for (int p = 0; p < 64; ++p) {
+    for (int c = 0; c < 3; ++c)  // small integers: exact in any order
+      EXPECT_EQ(y.at(p, c), before.at(p, c) + sum[p][c]) << "point " << p;
+    EXPECT_EQ(y.at(p, 3), S(0)) << "point " << p;
+  }
+}
+
+TYPED_TEST(PointsOfPacks, OfRowsAreReadAndAddedToTogether) {
+  using S = TypeParam;
+  constexpr int kLanes = Pack<S>::kLanes;
+  const std::vector<std::vector<std::uint16_t>> places = {
+      {7, 30, 18, 55}, {0, 5, 10, 15}, {4, 4, 4, 4}, {16, 12, 8, 4}};
+  for (const auto& begins : places) {
+    expect_runs<4, S>(begins);
+    if constexpr (kLanes >= 8) expect_runs<8, S>(begins);
+    if constexpr (kLanes >= 16) expect_runs<16, S>(begins);
+  }
+}
+
+TEST(Codes, ComeBackAsTheNearestIntegers) {
+  constexpr int kLanes = Pack<float>::kLanes;
+  Pack<float> x;
+  for (int k = 0; k < kLanes; ++k) x.set(k, 1000.0F * static_cast<float>(k - 4) + 0.4F);
+  x.set(0, 32767);
+  x.set(1, -32767);
+  x.set(2, 2.5F);  // to the even one
+  std::array<std::int16_t, kLanes> codes;
+
+  cpu::store_narrowed(codes.data(), x);
+  const Pack<float> back = cpu::widened(codes.data());
+
+  EXPECT_EQ(back[0], 32767);
+  EXPECT_EQ(back[1], -32767);
+  EXPECT_EQ(back[2], 2);
+  for (int k = 3; k < kLanes; ++k) EXPECT_EQ(back[k], 1000.0F * static_cast<float>(k - 4));
+}
+
+TEST(Codes, OfAGroupGoToOtherLanes) {
+  constexpr int kLanes = Pack<float>::kLanes;
+  std::array<std::int16_t, cpu::kGroup> from;
+  std::iota(from.begin(), from.end(), std::int16_t{100});
+  cpu::CodeLanes to;
+  cpu::LanePicker some, others;
+  for (int k = 0; k < kLanes; k += 2) some.pick(k, cpu::kGroup - 1 - k);
+  others.pick(1, 3);
+
+  some.add(from.data(), true, to);
+  others.add(from.data(), false, to);
+
+  for (int k = 0; k < kLanes; ++k)
+    EXPECT_EQ(to.at[k], k == 1 ? 103 : k % 2 == 0 ? 100 + cpu::kGroup - 1 - k : 0) << k;
+}
+
+TEST(Packs, KnowWhetherAMaskHoldsInEveryLane) {
+  Pack<float> x(1.0F);
+  EXPECT_TRUE(cpu::all(x > Pack<float>(0.5F)));
+  x.set(Pack<float>::kLanes - 1, 0);
+  EXPECT_FALSE(cpu::all(x > Pack<float>(0.5F)));
+}
+
+}  // namespace
+}  // namespace kerf
