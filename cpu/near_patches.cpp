@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cpu/near_patches.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -45,8 +46,10 @@ class NearPatches {
       sum += 0 * p;
       at[point] = p;
     };
-    for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v)
+    for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v) {
+      prefetch_place(std::min(v + kAhead, patch.own.end() - 1));
       if (level_.vertex[v] >= 0) add(v, level_.own_point[v]);
+    }
     for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
       add(level_.copy_vertex[k], level_.copy_point[k]);
     out.finite = std::isfinite(sum[0] + sum[1] + sum[2]);
@@ -66,6 +69,13 @@ class NearPatches {
   }
 
  private:
+  static constexpr std::int32_t kAhead = 32;
+
+  /// Vertices of a patch are numbered anew, and their places lie anywhere.
+  void prefetch_place(std::int32_t packed) const {
+    const std::int32_t vertex = level_.vertex[packed];
+    if (vertex >= 0) prefetch(level_.level->point.data(), static_cast<std::size_t>(vertex), 1);
+  }
   Place position(std::int32_t packed) const {
     const double* u = displacement_.data() + scalar_of(packed);
     const Vec3i& x = level_.level->point[level_.vertex[packed]];
@@ -77,9 +87,16 @@ class NearPatches {
     const std::uint16_t* slots =
         level_.folded(g) ? level_.slots.data() + 8 * kGroup * std::size_t(level_.slots_at[g])
                          : level_.corners.data() + 8 * kGroup * g;
+    // In a row the right end of a cell is the left one of the next.
+    const auto row = static_cast<RowKind>(level_.row[g]);
+    const auto run = static_cast<std::size_t>(level_.folded(g) ? 1 : run_of(row));
     PlaceBox all;
-    for (std::size_t n = 0; n < 8 * kGroup; ++n)
-      if (slots[n] != kNothing) all.add(at[slots[n]]);
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::size_t step = i % 2 == 0 ? 1 : run;
+      for (std::size_t k = step - 1; k < kGroup; k += step)
+        if (const std::uint16_t point = slots[kGroup * i + k]; point != kNothing)
+          all.add(at[point]);
+    }
     if (!reach_.may_meet(all.box(), false)) return;
     for (std::size_t k = 0; k < kGroup; ++k) {
       const std::int32_t c = level_.cell[kGroup * g + k];
