@@ -5,6 +5,7 @@
 #include <memory>
 #include <numeric>
 
+#include "core/base/error.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf::cpu {
@@ -167,6 +168,9 @@ TransferDraft TransferRows::operator()(std::int32_t n) {
     out.lead_terms.push_back(add_row(v, out));
   }
   for (const std::int32_t taken : out.points) local_[taken] = 0;
+  constexpr std::size_t kMost = 0x10000;
+  ensures(out.points.size() <= kMost && out.terms.size() + out.lead.size() <= kMost,
+          "a patch has too many vertices for its transfers");
   const auto count = static_cast<std::ptrdiff_t>(count_);
   out.term_point.assign(points_.begin(), points_.begin() + count);
   out.term_weight.assign(weights_.begin(), weights_.begin() + count);

@@ -22,6 +22,10 @@ std::size_t bytes_of(const std::vector<T>& array) {
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
+/// Points of a patch, well below what 16 bits number; and those of a cell, at the most: its slots,
+/// and all corners but one hanging.
+constexpr std::size_t kCrowd = 60000, kCellPoints = 15;
+
 /// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads: more
 /// of them as long as they are not so small that most of their vertices are shared.
 std::int32_t patch_cells(std::int32_t cells) {
@@ -61,7 +65,8 @@ class Patcher {
         next_(index + 1 < hierarchy.levels.size() ? &hierarchy.levels[index + 1] : nullptr),
         finer_(finer),
         threads_(threads),
-        out_(out) {
+        out_(out),
+        crowd_of_(level_.point.size()) {
     out_.level = &level_;
   }
 
@@ -70,7 +75,8 @@ class Patcher {
     std::iota(all.begin(), all.end(), 0);
     extend();
     for (const std::int32_t c : all) out_.held[c] = held_of(c);
-    for (auto& cells : divide(level_, all, patch_cells(level_.cells()))) add_patch(cells);
+    for (auto& cells : without_crowds(divide(level_, all, patch_cells(level_.cells()))))
+      add_patch(cells);
     make_drafts();
     place();
   }
@@ -240,6 +246,32 @@ class Patcher {
     drafts_.push_back(std::move(draft));
     return drafts_.back();
   }
+  /// Whether the points of some cells may be too many for their numbers.
+  bool is_crowd(const std::vector<std::int32_t>& cells) {
+    if (kCellPoints * cells.size() <= kCrowd) return false;
+    ++crowd_;
+    std::size_t points = 0;  // at the most: hanging corners may be of several cells
+    for (const std::int32_t c : cells) {
+      for (int i = 0; i < 8; ++i) points += kernels::is_hanging(level_.fold[c], i) ? 1 : 0;
+      for (const std::int32_t v : level_.slots[c])
+        if (std::exchange(crowd_of_[v], crowd_) != crowd_) ++points;
+    }
+    return points > kCrowd;
+  }
+  /// Parts of which some are halved, until none is a crowd: where cuts set many cells free.
+  std::vector<std::vector<std::int32_t>> without_crowds(
+      std::vector<std::vector<std::int32_t>> parts) {
+    for (std::size_t i = 0; i < parts.size();) {
+      if (!is_crowd(parts[i])) {
+        ++i;
+        continue;
+      }
+      auto halves = divide(level_, parts[i], size_of((parts[i].size() + 1) / 2));
+      parts[i] = std::move(halves[0]);
+      parts.push_back(std::move(halves[1]));
+    }
+    return parts;
+  }
   void add_patch(const std::vector<std::int32_t>& cells) {
     out_.patches.emplace_back();
     add_draft(size_of(out_.patches.size()) - 1, cells);
@@ -258,8 +290,12 @@ class Patcher {
     std::copy_if(first, last, std::back_inserter(cells), is_cell);
     cells.insert(cells.end(), work.arrived.begin(), work.arrived.end());
     const std::int32_t most = patch_cells(level_.cells());
-    if (size_of(cells.size()) <= most + most / 2) return void(add_draft(p, cells));
-    const auto parts = divide(level_, cells, most);
+    std::vector<std::vector<std::int32_t>> parts;
+    if (size_of(cells.size()) <= most + most / 2)
+      parts.push_back(std::move(cells));
+    else
+      parts = divide(level_, cells, most);
+    parts = without_crowds(std::move(parts));
     add_draft(p, parts[0]);
     for (std::size_t i = 1; i < parts.size(); ++i) add_patch(parts[i]);
     Work made;
@@ -270,7 +306,6 @@ class Patcher {
   /// Whether a patch with so many cells is changed rather than made anew: where little changes,
   /// and cuts before have left few gaps.
   bool may_stay(std::int32_t p, std::size_t cells) const {
-    constexpr std::size_t kFewPoints = 40000;
     const Work& work = works_[p];
     const Patch& patch = out_.patches[p];
     const std::size_t others = work.arrived.size() + work.moved.size() + work.changed.size();
@@ -279,7 +314,7 @@ class Patcher {
     const std::size_t points = of(patch.own.size) + of(patch.copies.size) + of(patch.hanging.size);
     return 2 * others <= cells && cells + work.arrived.size() <= most + most / 2 &&
            of(patch.points) <= points + points / 2 + 64 &&
-           of(patch.points) + 8 * others <= kFewPoints &&
+           std::max(of(patch.points), points) + kCellPoints * others <= kCrowd &&
            kGroup * of(patch.groups.size) <= cells + cells / 8 + 8 * kGroup &&
            2 * of(patch.folded.size) <= 3 * of(patch.groups.size);
   }
@@ -387,6 +422,8 @@ class Patcher {
   std::vector<Draft> drafts_;
   PatchMoves moves_;
   std::size_t last_kind_ = 0;
+  Marks crowd_of_;  // per vertex: the last crowd that it was counted in
+  std::int32_t crowd_ = 0;
 };
 
 }  // namespace

@@ -53,6 +53,31 @@ TEST(Patches, AreWholeWhenMade) {
   EXPECT_GT(levels[0].shared, 100);
 }
 
+// The first patch of a body of 64^3 cells would have 8192, each with eight points of its own here.
+TEST(Patches, OfLooseCellsHaveNumbersForAllPoints) {
+  LinkedOctree body(test::box_body({64, 64, 64}), 0);
+  for (int z = 0; z < 16; ++z)
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 32; ++x)
+        for (int axis = 0; axis < 3; ++axis) test::disconnect(body, {x, y, z}, axis);
+  ProblemOptions options;
+  options.max_levels = 1;
+  options.with_oracle = false;
+  const Problem p(std::move(body), options);
+
+  const std::vector<PatchedLevel> levels = patches_of(p.hierarchy, 2);
+
+  const PatchedLevel& l = levels[0];
+  EXPECT_EQ(l.patches.size(), 33u) << "the crowded one is halved, the others are not";
+  int loose = 0;
+  for (const cpu::Patch& patch : l.patches) {
+    EXPECT_LE(patch.points, 0xFFFF);
+    loose += patch.points > 8 * 4096;
+  }
+  EXPECT_EQ(loose, 2);
+  test::expect_slots(l);
+}
+
 TEST(Patches, AreWholeWithoutDuplicates) {
   const Problem p = cut_octree(false);
   test::expect_whole(patches_of(p.hierarchy, 1));
