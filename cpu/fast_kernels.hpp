@@ -15,6 +15,7 @@
 #include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/hex_element.hpp"
+#include "kernels/host_device.hpp"
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
 #include "kernels/residual.hpp"
@@ -114,9 +115,6 @@ template <RowKind kKind, class S>
 }
 
 /// Calls body(points of the corners, how they lie, first lane) for each pack of a group.
-/// Bodies of products are flattened, all that they call inlined: the frames of what is not hold
-/// packs by the kilobyte, and with 512 bits loads waited for stores 4096 bytes away from them, at
-/// twice the time of a product.
 template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
   constexpr std::size_t kAhead = 4, kPoints = 8 * kGroup;
@@ -146,35 +144,32 @@ void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
   const PackedMaterial<S>& material = values.materials[kind.material];
   const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
   values.prefetch_behind(group);
-  for_corners<S>(
-      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
-        kernels::Vec3<P> at[8];
-        gather_corners<row()>(points, x, at);
-        const auto R = kernels::to_matrix(values.quaternion(group, first));
-        if (scale.mass == 0)
-          kernels::apply_cell(at, R, stiffness, material.modes.stiffness, at);
-        else
-          kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
-        add_corners<row()>(points, at, y);
-      });
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
+    kernels::Vec3<P> at[8];
+    gather_corners<row()>(points, x, at);
+    const auto R = kernels::to_matrix(values.quaternion(group, first));
+    if (scale.mass == 0)
+      kernels::apply_cell(at, R, stiffness, material.modes.stiffness, at);
+    else
+      kernels::apply_cell(at, R, stiffness, mass, material.modes, at);
+    add_corners<row()>(points, at, y);
+  });
 }
 
 /// y += A x for a group of a stored level.
 template <class S>
 void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrices,
                      std::size_t group, const S* x, S* y) {
-  for_corners<S>(
-      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
-        kernels::Vec3<Pack<S>> at[8];
-        gather_corners<row()>(points, x, at);
-        matrices.read(group, first,
-                      [&](const auto& entries, const Pack<S>& unit, auto translations) {
-                        if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
-                          for (auto& v : at) v *= unit;
-                        kernels::apply_mode_matrix<translations()>(entries, at, at);
-                      });
-        add_corners<row()>(points, at, y);
-      });
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
+    kernels::Vec3<Pack<S>> at[8];
+    gather_corners<row()>(points, x, at);
+    matrices.read(group, first, [&](const auto& entries, const Pack<S>& unit, auto translations) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
+        for (auto& v : at) v *= unit;
+      kernels::apply_mode_matrix<translations()>(entries, at, at);
+    });
+    add_corners<row()>(points, at, y);
+  });
 }
 
 /// y += the elastic force of a group of level 0 displaced by x.
@@ -184,22 +179,21 @@ void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, st
   using P = Pack<S>;
   const CellKind& kind = level.kinds[level.kind[group]];
   values.prefetch_behind(group);
-  for_corners<S>(
-      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
-        kernels::Vec3<P> at[8];
-        gather_corners<row()>(points, x, at);
-        kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
-                               values.materials[kind.material].modes.stiffness, at);
-        add_corners<row()>(points, at, y);
-      });
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
+    kernels::Vec3<P> at[8];
+    gather_corners<row()>(points, x, at);
+    kernels::elastic_force(at, values.quaternion(group, first), P(kind.side), P(kind.stiffness),
+                           values.materials[kind.material].modes.stiffness, at);
+    add_corners<row()>(points, at, y);
+  });
 }
 
 /// Two packs of rotations from mean gradients, warm-started: they take their steps in turn, since
 /// each operation of a step waits for the one before. Where Newton proves nothing within its steps,
 /// a lane goes the way of the reference.
 template <class S>
-[[gnu::flatten]] void rotate_two(const kernels::Mat3<Pack<S>>* F,
-                                 const kernels::Quat<Pack<S>>* start, kernels::Quat<Pack<S>>* q) {
+KERF_FLATTEN void rotate_two(const kernels::Mat3<Pack<S>>* F, const kernels::Quat<Pack<S>>* start,
+                             kernels::Quat<Pack<S>>* q) {
   using P = Pack<S>;
   constexpr int kIterations = 8, kPacks = 2;
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
@@ -250,13 +244,12 @@ void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_
   kernels::Mat3<P> F[kPacks];
   kernels::Quat<P> start[kPacks], q[kPacks];
   values.prefetch_behind(group);
-  for_corners<S>(
-      level, group, [&](const std::uint16_t* points, auto row, int first) __attribute__((flatten)) {
-        kernels::Vec3<P> corners[8];
-        gather_corners<row()>(points, x, corners);
-        F[first / P::kLanes] = kernels::mean_gradient(corners, side);
-        start[first / P::kLanes] = values.quaternion(group, first);
-      });
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
+    kernels::Vec3<P> corners[8];
+    gather_corners<row()>(points, x, corners);
+    F[first / P::kLanes] = kernels::mean_gradient(corners, side);
+    start[first / P::kLanes] = values.quaternion(group, first);
+  });
   for (int n = 0; n < kPacks; n += 2) rotate_two<S>(F + n, start + n, q + n);
   for (int n = 0; n < kPacks; ++n) values.set_quaternion(group, n * P::kLanes, q[n]);
 }
