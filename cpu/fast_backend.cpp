@@ -138,7 +138,8 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
                            l == 0 ? nullptr : &moves, threads_, level.patched);
     level.bound = 0;
     const std::size_t size = kTileScalars * level.patched.tiles();
-    resize_with_room(level.inverse_diagonal, 2 * size, S(0));  // made anew before it is used
+    // Made anew where there are vertices; elsewhere what is left of it meets zeros.
+    resize_with_room(level.inverse_diagonal, 2 * size, S(0));
     for (std::size_t x = 0; x < level.vectors.size(); ++x) {
       renumber(moves.vertices, size, level.vectors.held(x).single);
       renumber(moves.vertices, size, level.vectors.held(x).exact);
@@ -376,9 +377,12 @@ void FastBackend<S>::coarsen(int fine) {
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const auto cells = packed.cell.begin() + kGroup * g + first;
-      if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) return;
-      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
       P out[kEntries];
+      if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {
+        std::fill(out, out + kEntries, P(0));
+        return to.matrices.store(group, first, out);
+      }
+      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
       if (kind == kGeneral)
         merge_general(fine, group, first, out);
       else if (fine == 0)

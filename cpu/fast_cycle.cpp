@@ -255,7 +255,9 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
         r[i] = static_cast<S>(from[kTileScalars * tile + i]);
       for_packs<S>([&](int first) {
         store_tile(z, 0, first,
-                   l.times_inverse(tile, first, load_tile(static_cast<const S*>(r), 0, first)));
+                   l.times_inverse(tile, first,
+                                   {load_pack<S>(r + first), load_pack<S>(r + kGroup + first),
+                                    load_pack<S>(r + 2 * kGroup + first)}));
       });
       for (std::size_t i = 0; i < kTileScalars; ++i)
         to[kTileScalars * tile + i] = static_cast<T>(z[i]);

@@ -84,11 +84,13 @@ inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t
          static_cast<std::size_t>(first);
 }
 
+/// Cells of a row within a pack.
+template <RowKind kKind, class S>
+inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
+
 /// The corners of the lanes of a pack. In rows they follow each other along x, so that two of them
 /// are read and written together, and no numbers but the first of a row are.
 /// Inlined, since arrays of packs that a call fills are cleared before.
-template <RowKind kKind, class S>
-inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
                                                   kernels::Vec3<Pack<S>> (&out)[8]) {

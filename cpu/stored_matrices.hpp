@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <type_traits>
 #include <vector>
 
@@ -79,7 +80,7 @@ class LanePicker {
   __mmask16 picks_ = 0;
   alignas(32) std::int16_t from_[16] = {};
 #elif defined(__AVX2__) && defined(__FMA__)
-  LanePicker() { std::fill_n(bytes_[0], sizeof bytes_, std::uint8_t{0x80}); }  // zero
+  LanePicker() { std::memset(bytes_, 0x80, sizeof bytes_); }  // zero
   void pick(int to, int from) {
     std::uint8_t* const bytes = bytes_[from / 8] + 2 * to;
     bytes[0] = static_cast<std::uint8_t>(2 * (from % 8));

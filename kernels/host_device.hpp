@@ -14,8 +14,8 @@
 
 // Inlines all that a function calls. With packs of 512 bits frames come to be 4096 bytes apart, and
 // loads of one wait for stores to the other; elsewhere it gains nothing and takes long to compile.
-#if defined(__AVX512F__) && !defined(__CUDACC__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && \
+    !defined(__CUDACC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define KERF_FLATTEN __attribute__((flatten))
 #else
 #define KERF_FLATTEN

@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <vector>
 
+#include "cpu/patch_sweep.hpp"
 #include "cpu/patched_level.hpp"
 #include "cpu/stored_matrices.hpp"
 
@@ -165,11 +167,45 @@ TEST(Codes, OfAGroupGoToOtherLanes) {
     EXPECT_EQ(to.at[k], k == 1 ? 103 : k % 2 == 0 ? 100 + cpu::kGroup - 1 - k : 0) << k;
 }
 
-TEST(Packs, KnowWhetherAMaskHoldsInEveryLane) {
-  Pack<float> x(1.0F);
-  EXPECT_TRUE(cpu::all(x > Pack<float>(0.5F)));
-  x.set(Pack<float>::kLanes - 1, 0);
-  EXPECT_FALSE(cpu::all(x > Pack<float>(0.5F)));
+TYPED_TEST(PointsOfPacks, AndMasksHoldOnlyInEveryLane) {
+  using P = Pack<TypeParam>;
+  const P half(0.5);
+  EXPECT_TRUE(cpu::all(P(1) > half));
+  for (int k = 0; k < P::kLanes; ++k) {
+    P x(1);
+    x.set(k, 0);
+    EXPECT_FALSE(cpu::all(x > half)) << "lane " << k;
+  }
+}
+
+TEST(Packs, GiveTheGreaterSizeAndPassOverWhatIsNoNumber) {
+  Pack<float> a(-3), b(2);
+  a.set(0, 1);
+  a.set(1, std::numeric_limits<float>::quiet_NaN());
+  const Pack<float> greater = cpu::greater_size(a, b);
+  for (int k = 0; k < Pack<float>::kLanes; ++k) EXPECT_EQ(greater[k], k < 2 ? 2 : 3) << k;
+}
+
+TYPED_TEST(PointsOfPacks, AreZeroWhereTheyAreHeldInAnyLane) {
+  using P = Pack<TypeParam>;
+  for (int k = 0; k < P::kLanes; ++k) {
+    std::array<std::uint8_t, cpu::kGroup> fixed{};
+    fixed[static_cast<std::size_t>(k)] = 5;  // x and z
+    const Vec3<P> v = cpu::masked(Vec3<P>{P(1), P(2), P(3)}, fixed.data());
+    for (int lane = 0; lane < P::kLanes; ++lane) {
+      EXPECT_EQ(v.x[lane], lane == k ? 0 : 1);
+      EXPECT_EQ(v.y[lane], 2);
+      EXPECT_EQ(v.z[lane], lane == k ? 0 : 3);
+    }
+  }
+}
+
+TYPED_TEST(PointsOfPacks, SumOverAllLanes) {
+  using P = Pack<TypeParam>;
+  P x;
+  double expected = 0;
+  for (int k = 0; k < P::kLanes; ++k) x.set(k, static_cast<TypeParam>(1 << k)), expected += 1 << k;
+  EXPECT_EQ(cpu::sum_lanes(x), expected);
 }
 
 }  // namespace
