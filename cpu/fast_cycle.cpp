@@ -256,8 +256,8 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
       for_packs<S>([&](int first) {
         store_tile(z, 0, first,
                    l.times_inverse(tile, first,
-                                   {load_pack<S>(r + first), load_pack<S>(r + kGroup + first),
-                                    load_pack<S>(r + 2 * kGroup + first)}));
+                                   {tile_pack<S>(r, 0, 0, first), tile_pack<S>(r, 0, 1, first),
+                                    tile_pack<S>(r, 0, 2, first)}));
       });
       for (std::size_t i = 0; i < kTileScalars; ++i)
         to[kTileScalars * tile + i] = static_cast<T>(z[i]);

@@ -13,15 +13,12 @@
 #include <type_traits>
 
 #include "kernels/fma.hpp"
+#include "kernels/host_device.hpp"
 #include "kernels/mat3.hpp"
 
 namespace kerf::cpu {
 
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
-inline constexpr int kPackBytes = 64;
-#else
-inline constexpr int kPackBytes = 32;
-#endif
+inline constexpr int kPackBytes = KERF_PACK_BITS == 512 ? 64 : 32;
 
 /// Lane by lane all ones or all zeros.
 template <class S, int kBytes = kPackBytes>
@@ -123,9 +120,9 @@ template <class S>
 //                    point is summed first
 //
 // Results by reference: GCC 12 copies structs of packs by halves of 64 bits.
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+#if KERF_PACK_BITS == 512
 #include "cpu/pack_avx512.hpp"
-#elif defined(__AVX2__) && defined(__FMA__)
+#elif KERF_PACK_BITS == 256
 #include "cpu/pack_avx2.hpp"
 #else
 #include "cpu/pack_plain.hpp"

@@ -5,8 +5,7 @@
 
 #include "cpu/pack.hpp"
 
-#if defined(__AVX2__) && defined(__FMA__) && \
-    !(defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__))
+#if KERF_PACK_BITS == 256
 #include <immintrin.h>
 
 namespace kerf::cpu {

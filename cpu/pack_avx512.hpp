@@ -6,7 +6,7 @@
 
 #include "cpu/pack.hpp"
 
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+#if KERF_PACK_BITS == 512
 #include <immintrin.h>
 
 namespace kerf::cpu {

@@ -5,7 +5,7 @@
 
 #include "cpu/pack.hpp"
 
-#if !defined(__AVX2__) || !defined(__FMA__)
+#if KERF_PACK_BITS == 0
 
 namespace kerf::cpu {
 

@@ -26,10 +26,10 @@ namespace kerf::cpu {
 
 /// Integers as scalars.
 inline Pack<float> widened(const std::int16_t* from) {
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+#if KERF_PACK_BITS == 512
   const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
   return Pack<float>::Vector(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(codes)));
-#elif defined(__AVX2__) && defined(__FMA__)
+#elif KERF_PACK_BITS == 256
   const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
   return Pack<float>::Vector(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(codes)));
 #else
@@ -41,10 +41,10 @@ inline Pack<float> widened(const std::int16_t* from) {
 
 /// The nearest integers, even ones in the middle.
 inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+#if KERF_PACK_BITS == 512
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to),
                       _mm512_cvtsepi32_epi16(_mm512_cvtps_epi32(__m512(x.v))));
-#elif defined(__AVX2__) && defined(__FMA__)
+#elif KERF_PACK_BITS == 256
   const __m256i codes = _mm256_cvtps_epi32(__m256(x.v));
   _mm_storeu_si128(
       reinterpret_cast<__m128i*>(to),
@@ -62,7 +62,7 @@ struct alignas(kPackBytes / 2) CodeLanes {
 /// Brings some lanes of the codes of a group to lanes of a pack.
 class LanePicker {
  public:
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__)
+#if KERF_PACK_BITS == 512
   void pick(int to, int from) {
     from_[to] = static_cast<std::int16_t>(from);
     picks_ |= static_cast<__mmask16>(1U << to);
@@ -79,7 +79,7 @@ class LanePicker {
  private:
   __mmask16 picks_ = 0;
   alignas(32) std::int16_t from_[16] = {};
-#elif defined(__AVX2__) && defined(__FMA__)
+#elif KERF_PACK_BITS == 256
   LanePicker() { std::memset(bytes_, 0x80, sizeof bytes_); }  // zero
   void pick(int to, int from) {
     std::uint8_t* const bytes = bytes_[from / 8] + 2 * to;

@@ -12,10 +12,19 @@
 #define KERF_HD inline
 #endif
 
+// Bits of a SIMD register that packs of scalars are written for (cpu/pack.hpp); 0: for none.
+#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__FMA__)
+#define KERF_PACK_BITS 512
+#elif defined(__AVX2__) && defined(__FMA__)
+#define KERF_PACK_BITS 256
+#else
+#define KERF_PACK_BITS 0
+#endif
+
 // Inlines all that a function calls. With packs of 512 bits frames come to be 4096 bytes apart, and
 // loads of one wait for stores to the other; elsewhere it gains nothing and takes long to compile.
-#if defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && \
-    !defined(__CUDACC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if KERF_PACK_BITS == 512 && !defined(__CUDACC__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
 #define KERF_FLATTEN __attribute__((flatten))
 #else
 #define KERF_FLATTEN
