@@ -401,24 +401,27 @@ template <int s, class T, class Matrix>
 KERF_HD void apply_mode_row(const Matrix& A, const T (&in)[3][kCorners], T (&out)[3][kCorners]) {
   const T own[3] = {in[0][s], in[1][s], in[2][s]};
   T sum[3];
+  // Unrolled by hand: GCC 12 leaves loops here, whose sums then go through memory.
   unrolled<7 - s>([&](auto col) {
     constexpr int t = 7 - decltype(col)::value;
     const T other[3] = {in[0][t], in[1][t], in[2][t]};
     T across[3] = {out[0][t], out[1][t], out[2][t]};
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const T a = A[mode_entry(s, i, t, k)];
-        sum[i] = t == 7 && k == 0 ? a * other[0] : fma(a, other[k], sum[i]);
-        across[k] = fma(a, own[i], across[k]);
-      }
+    unrolled<9>([&](auto entry) {
+      constexpr int i = decltype(entry)::value / 3, k = decltype(entry)::value % 3;
+      const T a = A[mode_entry(s, i, t, k)];
+      sum[i] = t == 7 && k == 0 ? a * other[0] : fma(a, other[k], sum[i]);
+      across[k] = fma(a, own[i], across[k]);
+    });
     for (int k = 0; k < 3; ++k) out[k][t] = across[k];
   });
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k <= i; ++k) {
+  unrolled<9>([&](auto entry) {
+    constexpr int i = decltype(entry)::value / 3, k = decltype(entry)::value % 3;
+    if constexpr (k <= i) {
       const T a = A[mode_entry(s, i, s, k)];
       sum[i] = s == 7 && k == 0 ? a * own[0] : fma(a, own[k], sum[i]);
       if (k < i) sum[k] = fma(a, own[i], sum[k]);
     }
+  });
   for (int i = 0; i < 3; ++i) out[i][s] = sum[i];
 }
 
