@@ -96,12 +96,12 @@ void store_pack(S* to, const Pack<S, kBytes>& pack) {
 
 /// Asks memory for `count` scalars from x[first] on, which need not be there. What fetches ahead by
 /// itself begins anew with every page, and a pass over a level meets many.
-template <class S>
+template <bool to_write = false, class S>
 [[gnu::always_inline]] inline void prefetch(const S* x, std::size_t first, std::size_t count) {
   constexpr std::size_t kLine = 64;
   const auto at = reinterpret_cast<std::uintptr_t>(x) + first * sizeof(S);
   for (std::size_t k = 0; k < count * sizeof(S); k += kLine)
-    __builtin_prefetch(reinterpret_cast<const void*>(at + k));
+    __builtin_prefetch(reinterpret_cast<const void*>(at + k), to_write ? 1 : 0);
 }
 
 }  // namespace kerf::cpu

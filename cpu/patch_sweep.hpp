@@ -45,11 +45,11 @@ Pack<S> tile_pack(const S* x, std::size_t tile, int component, int first) {
 }
 
 /// Asks for what a pass over tiles needs a few of them later: `scalars` of a vertex.
-template <class S>
+template <bool to_write = false, class S>
 void prefetch_tile(const S* x, std::size_t tile, std::size_t scalars) {
   constexpr std::size_t kAhead = 8;
   const std::size_t size = kGroup * scalars;
-  prefetch<S>(x, size * (tile + kAhead), size);
+  prefetch<to_write>(x, size * (tile + kAhead), size);
 }
 
 /// The vectors of a tile, of the lanes from `first` on.
@@ -76,6 +76,7 @@ kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) 
 template <class To, class S>
 kernels::Vec3<Pack<S>> store_tile_as(To* x, std::size_t tile, int first, kernels::Vec3<Pack<S>> v) {
   typedef To Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(To))));
+  if (first == 0) prefetch_tile<true>(static_cast<const To*>(x), tile, 3);
   for (int c = 0; c < 3; ++c) {
     const Narrow narrow = __builtin_convertvector(v[c].v, Narrow);
     __builtin_memcpy(x + kTileScalars * tile + kGroup * c + first, &narrow, sizeof narrow);
@@ -86,6 +87,7 @@ kernels::Vec3<Pack<S>> store_tile_as(To* x, std::size_t tile, int first, kernels
 
 template <class S>
 void store_tile(S* x, std::size_t tile, int first, const kernels::Vec3<Pack<S>>& v) {
+  if (first == 0) prefetch_tile<true>(static_cast<const S*>(x), tile, 3);
   S* to = x + kTileScalars * tile + first;
   store_pack(to, v.x);
   store_pack(to + kGroup, v.y);
