@@ -100,8 +100,7 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
 
 /// A vector in the numbers of now.
 template <class T>
-void renumber(const std::vector<PatchMoves::Move>& moves, std::size_t size,
-              std::vector<T>& vector) {
+void renumber(const std::vector<PatchMoves::Move>& moves, std::size_t size, Array<T>& vector) {
   if (vector.empty()) return;
   std::vector<std::array<T, 3>> values(moves.size());
   for (std::size_t n = 0; n < moves.size(); ++n)

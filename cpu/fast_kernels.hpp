@@ -37,7 +37,7 @@ struct PackedMaterial {
 /// What the elements of level 0 are made of.
 template <class S>
 struct FinestValues {
-  std::vector<S> rotation;  // [group][w x y z][lane]
+  Array<S> rotation;  // [group][w x y z][lane]
   std::vector<PackedMaterial<S>> materials;
 
   /// Where w of a lane lies; the others follow in steps of a group.

@@ -27,17 +27,12 @@ namespace kerf::cpu {
 
 using kernels::Vec3;
 
-template <class T>
-std::size_t bytes_of(const std::vector<T>& array) {
-  return array.capacity() * sizeof(T);
-}
-
 /// A vector of one level, of the scalars of the cycle or exact.
 struct FastVector {
-  std::vector<float> single;
-  std::vector<double> exact;
+  Array<float> single;
+  Array<double> exact;
   template <class S>
-  std::vector<S>& in() {
+  Array<S>& in() {
     if constexpr (std::is_same_v<S, float>)
       return single;
     else
@@ -107,8 +102,8 @@ constexpr auto kNothingBefore = [](std::size_t) {};
 template <class S>
 struct FastLevel {
   PatchedLevel patched;
-  StoredMatrices<S> matrices;       // levels above 0
-  std::vector<S> inverse_diagonal;  // [tile][xx xy xz yy yz zz][kGroup]
+  StoredMatrices<S> matrices;  // levels above 0
+  Array<S> inverse_diagonal;   // [tile][xx xy xz yy yz zz][kGroup]
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
@@ -294,9 +289,9 @@ class FastBackend final : public Backend {
   SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
-  std::vector<double> partial_;  // sums of shared vertices, by copy; of the scalars of the sweep
-  int waiting_ = -1;             // level whose solution is still to be corrected
-  std::vector<Vec3d> faces_;     // of the surface: area normals
+  Array<double> partial_;     // sums of shared vertices, by copy; of the scalars of the sweep
+  int waiting_ = -1;          // level whose solution is still to be corrected
+  std::vector<Vec3d> faces_;  // of the surface: area normals
   std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   FrontFactor<S> coarsest_factor_;

@@ -139,8 +139,7 @@ void PatchWriter::close_gaps() {
 void PatchWriter::change_cells() {
   for (std::size_t n = 0; n < draft_.changed.size(); ++n) {
     const std::int32_t c = draft_.changed[n], lane = out_.lane[c], group = lane / kGroup;
-    const auto put = [&](const Draft::Corners& from, std::int32_t block,
-                         std::vector<std::uint16_t>& array) {
+    const auto put = [&](const Draft::Corners& from, std::int32_t block, auto& array) {
       for (std::size_t i = 0; i < 8; ++i)
         array[8 * kGroup * std::size_t(block) + kGroup * i + std::size_t(lane % kGroup)] = from[i];
     };

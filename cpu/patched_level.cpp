@@ -15,11 +15,6 @@
 namespace kerf::cpu {
 namespace {
 
-template <class T>
-std::size_t bytes_of(const std::vector<T>& array) {
-  return array.capacity() * sizeof(T);
-}
-
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
 /// Points of a patch, well below what 16 bits number; and those of a cell, at the most: its slots,

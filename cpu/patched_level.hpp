@@ -26,11 +26,18 @@
 #include <span>
 #include <vector>
 
+#include "core/base/array.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/levels/update.hpp"
 #include "cpu/pack.hpp"
 
 namespace kerf::cpu {
+
+/// What an array holds, with the room that is reserved.
+template <class T, class Allocator>
+std::size_t bytes_of(const std::vector<T, Allocator>& array) {
+  return array.capacity() * sizeof(T);
+}
 
 /// Cells of a group and vertices of a tile: those of the widest pack.
 inline constexpr int kGroup = 16;
@@ -139,18 +146,18 @@ struct PatchedLevel {
 
   std::vector<std::int32_t> cell;      // per lane, -1: none
   std::vector<std::int32_t> lane;      // per cell
-  std::vector<std::uint16_t> corners;  // [group][8][kGroup]: points
+  Array<std::uint16_t> corners;        // [group][8][kGroup]: points
   std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
   std::vector<std::uint8_t> row;       // per group: RowKind
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
   std::vector<std::int32_t> patch_of;  // per group, -1: none
   std::vector<std::uint16_t> slots;    // [folded group][8][kGroup]: points
 
-  std::vector<std::int32_t> vertex;      // per packed vertex: that of the level, -1: none
-  std::vector<std::int32_t> packed;      // per vertex of the level
-  std::vector<std::uint8_t> fixed;       // per packed vertex, as Level::fixed
-  std::vector<std::uint16_t> own_point;  // per packed vertex that is not shared
-  std::vector<std::int32_t> home;        // per tile: its patch, kNowhere, or shared_home(n)
+  std::vector<std::int32_t> vertex;  // per packed vertex: that of the level, -1: none
+  std::vector<std::int32_t> packed;  // per vertex of the level
+  std::vector<std::uint8_t> fixed;   // per packed vertex, as Level::fixed
+  Array<std::uint16_t> own_point;    // per packed vertex that is not shared
+  std::vector<std::int32_t> home;    // per tile: its patch, kNowhere, or shared_home(n)
   std::vector<std::uint16_t> copy_point;
   std::vector<std::int32_t> copy_vertex;  // packed
   std::vector<std::uint16_t> hanging_point;
@@ -160,10 +167,10 @@ struct PatchedLevel {
   std::vector<std::int32_t> copies_begin, copies_of;  // per shared vertex, ascending
   RowState copy_rows;
 
-  Transfer transfer;                   // to the next level
-  std::vector<std::uint8_t> held;      // per cell: HeldCell, of it or of the cells below
-  std::vector<std::int32_t> children;  // [group][octant][kGroup], above level 0: lanes of the level
-                                       // before, -1: none, or wholly held; passed: octant 0
+  Transfer transfer;               // to the next level
+  std::vector<std::uint8_t> held;  // per cell: HeldCell, of it or of the cells below
+  Array<std::int32_t> children;    // [group][octant][kGroup], above level 0: lanes of the level
+                                   // before, -1: none, or wholly held; passed: octant 0
   std::size_t groups_built = 0, tiles_built = 0;  // when patches were last made from nothing
 
   static constexpr std::int32_t kNowhere = -1;

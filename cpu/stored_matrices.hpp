@@ -279,9 +279,9 @@ class StoredMatrices {
 
   std::vector<std::uint32_t> begin_;  // per group: entries before it, in its array
   std::vector<std::uint8_t> traits_;  // per group
-  std::vector<S> plain_;
-  std::vector<std::int16_t> codes_;
-  std::vector<S> unit_;  // per lane
+  Array<S> plain_;
+  Array<std::int16_t> codes_;
+  Array<S> unit_;  // per lane
 };
 
 }  // namespace kerf::cpu

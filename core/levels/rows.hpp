@@ -21,8 +21,8 @@ namespace kerf {
 inline std::size_t with_room(std::size_t size) { return size + size / 4 + 16; }
 
 /// Room for what cuts append is reserved when an array is moved anyway.
-template <class T>
-void resize_with_room(std::vector<T>& array, std::size_t size, const T& value = {}) {
+template <class T, class Allocator>
+void resize_with_room(std::vector<T, Allocator>& array, std::size_t size, const T& value = {}) {
   if (size > array.capacity()) array.reserve(with_room(size));
   array.resize(size, value);
 }
