@@ -12,19 +12,16 @@
 
 namespace kerf::cpu {
 
-/// Rows of one part, before they have a place in the arrays.
+/// A part before it has a place in the arrays. Runs and terms of blocks are counted from its own.
 struct TransferDraft {
   std::vector<std::int32_t> points;  // vertices of the next level
+  std::vector<TransferBlock> tiles, lead_blocks;
+  std::vector<TransferRun> runs;
   std::vector<std::uint16_t> term_point;
   std::vector<std::uint8_t> term_weight;
-  std::vector<std::int32_t> first_term;  // per tile of own vertices
-  std::vector<std::uint8_t> terms;       // per own vertex
+  std::vector<std::uint8_t> terms;  // per own vertex
   std::vector<std::int32_t> lead;
   std::vector<std::uint8_t> lead_terms;
-  std::int32_t first_lead_term = 0;
-  std::vector<std::uint16_t> point_terms;
-  std::vector<std::uint16_t> given_row;
-  std::vector<std::uint8_t> given_weight;
 };
 
 /// Of each vertex of a level its first cell, as in Level::incidences_of, which may be gone.
@@ -41,8 +38,8 @@ class FirstCells {
   std::vector<std::int32_t> first_;
 };
 
-/// The rows of one patch after the other. A row is that of the first cell of the vertex; those of
-/// its other cells agree.
+/// The parts of one patch after the other. What a vertex takes is its row: that of its first cell;
+/// those of its other cells agree.
 class TransferRows {
  public:
   TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first);
@@ -55,17 +52,40 @@ class TransferRows {
   };
   using SlotTerms = std::array<RowTerms, 8>;  // per slot of a child
 
+  /// The terms of a vertex, in points of the part.
+  struct Row {
+    const std::uint16_t* point;
+    const std::uint8_t* weight;
+    int count;
+
+    bool has_weights(int of_all) const;
+  };
+
   static SlotTerms terms_of(std::uint16_t child, int place, std::uint16_t parent);
   const SlotTerms& terms(std::uint16_t child, int place, std::uint16_t parent);
-  std::uint8_t add_row(std::int32_t vertex, TransferDraft& out);
+  void add_row(std::int32_t vertex, TransferDraft& out);
+  void sort_points(TransferDraft& out);
+  TransferBlock add_block(std::size_t first, std::size_t count, TransferDraft& out,
+                          std::vector<std::uint8_t>& terms);
+  TransferRun longest_run(std::size_t row, std::size_t end) const;
+  TransferRun run_of_kind(std::size_t row, std::size_t end, int rows, bool between) const;
+  Row row(std::size_t n) const {
+    const std::uint32_t begin = row_begin_[n];
+    return {points_.data() + begin, weights_.data() + begin,
+            static_cast<int>(row_begin_[n + 1] - begin)};
+  }
 
   const PatchedLevel& level_;
   const Level& next_;
   const FirstCells& first_;
-  Marks local_;                        // per vertex of the next level: its point, from 1
-  std::vector<std::uint16_t> points_;  // of the terms of a patch, and room for more
+  Marks local_;  // per vertex of the next level: its point, from 1
+  // Rows of all vertices of a patch, its own ones first, and room for more.
+  std::vector<std::uint16_t> points_;
   std::vector<std::uint8_t> weights_;
-  std::size_t count_ = 0;  // terms
+  std::vector<std::uint32_t> row_begin_;
+  std::vector<std::int32_t> met_;     // points as they were met
+  std::vector<std::uint64_t> order_;  // of them: place, then number
+  std::vector<std::uint16_t> rank_;
   std::array<SlotTerms, 9> regular_;
   std::unordered_map<std::uint64_t, SlotTerms> others_;
 };

@@ -108,27 +108,53 @@ struct Patch {
 };
 
 /// What the vertices of a patch take from those of the next level, in numbers of its own for
-/// these: its points. The row of a shared vertex is in one patch: that of its first cell.
+/// these: its points, by place. The vertices are in blocks: the tiles of its own, and then the
+/// leads, which are shared vertices. What a shared vertex takes is in one patch: that of its first
+/// cell.
 struct TransferPart {
   Range points;
-  Range terms;  // those of own vertices in their order, then those of leads; and again by point
-  Range leads;  // shared vertices
-  std::int32_t first_lead_term = 0;
+  Range runs, terms;
+  Range leads;
+  Range lead_blocks;  // of kGroup leads, but for the last
+};
+
+/// Vertices of a block side by side along x that take from points side by side along x: from one
+/// row of points, or from the mean of two or four rows. Every other vertex lies between two points
+/// of a row, and takes the mean of them.
+struct TransferRun {
+  static constexpr int kIdentity = 0;  // rows: each vertex takes its own point of one row, alone
+
+  std::uint8_t first = 0, size = 0;  // within the block
+  std::uint8_t rows = kIdentity;
+  std::uint8_t between = 0;     // 1: the first vertex lies between two points
+  std::uint16_t point[4] = {};  // the first one of each row
+
+  /// Points of a row that it takes from.
+  int points() const { return rows == kIdentity ? size : (size + between) / 2 + 1; }
+  friend bool operator==(const TransferRun&, const TransferRun&) = default;
+};
+
+struct TransferBlock {
+  std::int32_t first_run = 0, first_term = 0;
+  std::uint8_t runs = 0;
+  bool others = false;  // some vertex is in no run, but has terms
+  bool gaps = false;    // some place has no vertex
+
+  friend bool operator==(const TransferBlock&, const TransferBlock&) = default;
 };
 
 /// Between the vertices of a level and of the next.
 struct Transfer {
-  std::vector<TransferPart> parts;        // per patch
-  std::vector<std::int32_t> point;        // the vertex of the next level, in its own numbers
-  std::vector<std::uint16_t> term_point;  // within the part
-  std::vector<std::uint8_t> term_weight;  // 64ths: exact
-  std::vector<std::int32_t> first_term;   // per tile of own vertices
-  std::vector<std::uint8_t> terms;        // per packed vertex: how many
-  std::vector<std::int32_t> lead;         // packed
+  std::vector<TransferPart> parts;   // per patch
+  std::vector<std::int32_t> point;   // the vertex of the next level, in its own numbers
+  std::vector<TransferBlock> tiles;  // of own vertices
+  std::vector<TransferBlock> lead_blocks;
+  Array<TransferRun> runs;
+  Array<std::uint16_t> term_point;  // within the part
+  Array<std::uint8_t> term_weight;  // 64ths: exact
+  std::vector<std::uint8_t> terms;  // per packed vertex: how many, 0 in runs
+  std::vector<std::int32_t> lead;   // packed
   std::vector<std::uint8_t> lead_terms;
-  std::vector<std::uint16_t> point_terms;  // per point: how many
-  std::vector<std::uint16_t> given_row;    // the same terms by point: a vertex among those of the
-  std::vector<std::uint8_t> given_weight;  // part, own ones first
   std::vector<std::int32_t> giver_begin, givers;  // per vertex of the next level: its points
   RowState giver_rows;
 

@@ -41,113 +41,212 @@ class TransferPoints {
     }
   }
 
-  /// What the points give to own vertices.
-  kernels::Vec3<Pack<S>> taken(std::size_t tile, int first) const {
-    alignas(kPackBytes) S sums[4 * Pack<S>::kLanes];
-    take(tile, first, sums);
-    return gathered(static_cast<const S*>(sums));
+  /// What the points give to own vertices. Of a tile, the first lanes are asked for first.
+  kernels::Vec3<Pack<S>> taken(std::size_t tile, int first) {
+    if (first == 0) take(transfer_.tiles[tile], transfer_.terms.data() + kGroup * tile, kGroup);
+    return gathered(static_cast<const S*>(rows_ + 4 * first));
   }
 
   /// Adds it to the shared vertices of the part, where they are not held.
-  void add_to_leads(S* u) const {
-    Terms from = takes(static_cast<std::size_t>(part_.first_lead_term));
-    for (std::int32_t n = part_.leads.first; n < part_.leads.end(); ++n) {
-      const std::int32_t v = transfer_.lead[n];
-      R sum;
-      from.take(transfer_.lead_terms[n], sum);
-      S* to = u + scalar_of(v);
-      for (std::size_t c = 0; c < 3; ++c)
-        if (((level_.fixed[v] >> c) & 1) == 0) to[kGroup * c] += sum[c];
-    }
+  void add_to_leads(S* u) {
+    for_lead_blocks([&](const TransferBlock& block, std::int32_t first, int count) {
+      take(block, transfer_.lead_terms.data() + first, count);
+      for (int k = 0; k < count; ++k) {
+        const std::int32_t v = transfer_.lead[first + k];
+        S* to = u + scalar_of(v);
+        for (std::size_t c = 0; c < 3; ++c)
+          if (((level_.fixed[v] >> c) & 1) == 0)
+            to[kGroup * c] += rows_[4 * static_cast<std::size_t>(k) + c];
+      }
+    });
   }
 
   /// The other way: what the vertices give to the points, from a vector, by point.
   void give(const S* r, S* out) {
-    const auto first = static_cast<std::size_t>(part_.terms.first);
-    Terms from{rows_of(r), weights_, transfer_.given_row.data() + first,
-               transfer_.given_weight.data() + first};
-    for (std::int32_t k = part_.points.first; k < part_.points.end(); ++k) {
-      // In turn to two sums, so that the second need not wait for the first.
-      R even{}, odd{};
-      const int count = transfer_.point_terms[k];
-      for (int n = 0; n + 1 < count; n += 2) {
-        from.add(even);
-        from.add(odd);
-      }
-      if (count % 2 != 0) from.add(even);
-      even += odd;
-      __builtin_memcpy(out + 4 * static_cast<std::size_t>(k), &even, sizeof even);
+    S* const to = out + 4 * static_cast<std::size_t>(part_.points.first);
+    std::fill_n(to, 4 * static_cast<std::size_t>(part_.points.size), S(0));
+    for (std::int32_t v = own_.first; v < own_.end(); v += kGroup) {
+      const auto tile = static_cast<std::size_t>(v / kGroup);
+      for_packs<S>([&](int first) {
+        for_records(load_tile(r, tile, first), [&](int lane, const R& record) {
+          __builtin_memcpy(rows_ + 4 * (first + lane), &record, sizeof record);
+        });
+      });
+      give(transfer_.tiles[tile], transfer_.terms.data() + v, kGroup, to);
     }
+    for_lead_blocks([&](const TransferBlock& block, std::int32_t first, int count) {
+      S* row = rows_;
+      for (int k = 0; k < count; ++k, row += 4) {
+        const S* from = r + scalar_of(transfer_.lead[first + k]);
+        row[0] = from[0], row[1] = from[kGroup], row[2] = from[2 * kGroup], row[3] = 0;
+      }
+      give(block, transfer_.lead_terms.data() + first, count, to);
+    });
   }
 
  private:
-  /// Records and their weights, one after the other. Holds what it reads by itself, so that a loop
-  /// need not ask for it again behind each store.
-  struct Terms {
-    const S *records, *weights;
-    const std::uint16_t* which;
-    const std::uint8_t* code;
-
-    void skip(int count) {
-      which += count;
-      code += count;
-    }
-    void add(R& sum) {
-      R one, weight;
-      __builtin_memcpy(&one, records + 4 * std::size_t(*which++), sizeof one);
-      __builtin_memcpy(&weight, weights + 4 * std::size_t(*code++), sizeof weight);
-      sum += weight * one;
-    }
-    void take(int count, R& sum) {
-      sum = R{};
-      for (int n = 0; n < count; ++n) add(sum);
-    }
-  };
-  [[gnu::noinline]] void take(std::size_t tile, int first, S* sums) const {
-    const std::uint8_t* terms = transfer_.terms.data() + kGroup * tile;
-    Terms from = takes(static_cast<std::size_t>(transfer_.first_term[tile]));
-    for (int k = 0; k < first; ++k) from.skip(terms[k]);
-    for (int k = 0; k < Pack<S>::kLanes; ++k, sums += 4) {
-      R sum;
-      from.take(terms[first + k], sum);
-      __builtin_memcpy(sums, &sum, sizeof sum);
-    }
+  static void read(const S* x, std::size_t n, R& out) {
+    __builtin_memcpy(&out, x + 4 * n, sizeof out);
   }
-  Terms takes(std::size_t term) const {
-    return {x_, weights_, transfer_.term_point.data() + term, transfer_.term_weight.data() + term};
+  static void write(S* x, std::size_t n, const R& r) { __builtin_memcpy(x + 4 * n, &r, sizeof r); }
+  static void add(S* x, std::size_t n, const R& r) {
+    R sum;
+    read(x, n, sum);
+    write(x, n, sum + r);
   }
 
-  /// Weights in all components, by their code.
+  /// body(block, its first lead, how many)
+  template <class Body>
+  void for_lead_blocks(const Body& body) const {
+    std::int32_t first = part_.leads.first;
+    for (std::int32_t b = part_.lead_blocks.first; b < part_.lead_blocks.end();
+         ++b, first += kGroup)
+      body(transfer_.lead_blocks[b], first, std::min(kGroup, part_.leads.end() - first));
+  }
+
+  // Functions of their own where sweeps call them: see above.
+  [[gnu::noinline]] void take(const TransferBlock& block, const std::uint8_t* terms, int count) {
+    if (block.gaps) std::fill(std::begin(rows_), std::end(rows_), S(0));
+    const TransferRun* run = transfer_.runs.data() + block.first_run;
+    for (int n = 0; n < block.runs; ++n, ++run) switch (run->rows) {
+        case 1:
+          take_run<1>(*run);
+          break;
+        case 2:
+          take_run<2>(*run);
+          break;
+        case 4:
+          take_run<4>(*run);
+          break;
+        default:
+          take_run<TransferRun::kIdentity>(*run);
+      }
+    if (block.others) take_others(block, terms, count);
+  }
+  [[gnu::noinline]] void give(const TransferBlock& block, const std::uint8_t* terms, int count,
+                              S* to) const {
+    const TransferRun* run = transfer_.runs.data() + block.first_run;
+    for (int n = 0; n < block.runs; ++n, ++run) switch (run->rows) {
+        case 1:
+          give_run<1>(*run, to);
+          break;
+        case 2:
+          give_run<2>(*run, to);
+          break;
+        case 4:
+          give_run<4>(*run, to);
+          break;
+        default:
+          give_run<TransferRun::kIdentity>(*run, to);
+      }
+    if (block.others) give_others(block, terms, count, to);
+  }
+
+  /// The mean of the k-th points of the rows.
+  template <int rows>
+  void mean(const TransferRun& run, std::size_t k, R& out) const {
+    read(x_, run.point[0] + k, out);
+    if constexpr (rows >= 2) {
+      R second;
+      read(x_, run.point[1] + k, second);
+      out += second;
+    }
+    if constexpr (rows == 4) {
+      R third, fourth;
+      read(x_, run.point[2] + k, third);
+      read(x_, run.point[3] + k, fourth);
+      out += third + fourth;
+    }
+    if constexpr (rows > 1) out *= S(1) / S(rows);
+  }
+  template <int rows>
+  void take_run(const TransferRun& run) {
+    S* const to = rows_ + 4 * run.first;
+    const std::size_t size = run.size;
+    R left, right;
+    if constexpr (rows == TransferRun::kIdentity) {
+      for (std::size_t n = 0; n < size; ++n) {
+        read(x_, run.point[0] + n, left);
+        write(to, n, left);
+      }
+    } else {
+      mean<rows>(run, 0, left);
+      std::size_t n = 0;
+      if (run.between == 0) write(to, n++, left);
+      for (std::size_t k = 1; n < size; ++k) {
+        mean<rows>(run, k, right);
+        write(to, n++, S(0.5) * (left + right));
+        if (n < size) write(to, n++, right);
+        left = right;
+      }
+    }
+  }
+  void take_others(const TransferBlock& block, const std::uint8_t* terms, int count) {
+    const auto first = static_cast<std::size_t>(block.first_term);
+    const std::uint16_t* point = transfer_.term_point.data() + first;
+    const std::uint8_t* weight = transfer_.term_weight.data() + first;
+    for (int k = 0; k < count; ++k) {
+      if (terms[k] == 0) continue;
+      R sum{}, one;
+      for (int n = 0; n < terms[k]; ++n) {
+        read(x_, *point++, one);
+        sum += weights_[*weight++] * one;
+      }
+      write(rows_, static_cast<std::size_t>(k), sum);
+    }
+  }
+
+  /// The sum of what vertices give to the k-th points of the rows goes to each of them.
+  template <int rows>
+  void give_run(const TransferRun& run, S* to) const {
+    const S* const from = rows_ + 4 * run.first;
+    const std::size_t size = run.size;
+    const auto put = [&](std::size_t k, R sum) {
+      if constexpr (rows > 1) sum *= S(1) / S(rows);
+      for (int r = 0; r < std::max(rows, 1); ++r) add(to, run.point[r] + k, sum);
+    };
+    R at{}, half, next;
+    if constexpr (rows == TransferRun::kIdentity) {
+      for (std::size_t n = 0; n < size; ++n) {
+        read(from, n, at);
+        put(n, at);
+      }
+    } else {
+      std::size_t n = 0, k = 0;
+      if (run.between == 0) read(from, n++, at);
+      while (n < size) {
+        read(from, n++, half);
+        half *= S(0.5);
+        put(k++, at + half);
+        at = half;
+        if (n == size) break;
+        read(from, n++, next);
+        at += next;
+      }
+      put(k, at);
+    }
+  }
+  void give_others(const TransferBlock& block, const std::uint8_t* terms, int count, S* to) const {
+    const auto first = static_cast<std::size_t>(block.first_term);
+    const std::uint16_t* point = transfer_.term_point.data() + first;
+    const std::uint8_t* weight = transfer_.term_weight.data() + first;
+    for (int k = 0; k < count; ++k) {
+      R from;
+      read(rows_, static_cast<std::size_t>(k), from);
+      for (int n = 0; n < terms[k]; ++n) add(to, *point++, weights_[*weight++] * from);
+    }
+  }
+
+  /// Weights by their code.
   static const S* weights() {
     struct Table {
-      alignas(32) S w[65][4];
+      S w[65];
       Table() {
-        for (int code = 0; code <= 64; ++code)
-          std::fill_n(w[code], 4, static_cast<S>(code) / S(64));
+        for (int code = 0; code <= 64; ++code) w[code] = static_cast<S>(code) / S(64);
       }
     };
     static const Table table;
-    return table.w[0];
-  }
-
-  /// The vertices of the part, own ones first, as records.
-  const S* rows_of(const S* r) const {
-    thread_local PointBuffer<S> buffer;
-    S* const rows = buffer.reserve(4 * static_cast<std::size_t>(own_.size + part_.leads.size));
-    S* to = rows;
-    for (std::int32_t v = own_.first; v < own_.end(); v += kGroup)
-      for_packs<S>([&](int first) {
-        for_records(load_tile(r, static_cast<std::size_t>(v / kGroup), first),
-                    [&](int, const R& record) {
-                      __builtin_memcpy(to, &record, sizeof record);
-                      to += 4;
-                    });
-      });
-    for (std::int32_t n = part_.leads.first; n < part_.leads.end(); ++n, to += 4) {
-      const S* from = r + scalar_of(transfer_.lead[n]);
-      to[0] = from[0], to[1] = from[kGroup], to[2] = from[2 * kGroup], to[3] = 0;
-    }
-    return rows;
+    return table.w;
   }
 
   const PatchedLevel& level_;
@@ -156,6 +255,7 @@ class TransferPoints {
   Range own_;
   const S* weights_ = weights();
   S* x_;
+  alignas(kPackBytes) S rows_[4 * kGroup] = {};  // of the vertices of a block: records
 };
 
 /// The transfer of the patch at which a thread is, if there is one to do.

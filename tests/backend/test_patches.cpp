@@ -102,7 +102,9 @@ void expect_same(const PatchedLevel& a, const PatchedLevel& b) {
   EXPECT_EQ(a.transfer.point, b.transfer.point);
   EXPECT_EQ(a.transfer.term_point, b.transfer.term_point);
   EXPECT_EQ(a.transfer.term_weight, b.transfer.term_weight);
-  EXPECT_EQ(a.transfer.given_row, b.transfer.given_row);
+  EXPECT_EQ(a.transfer.runs, b.transfer.runs);
+  EXPECT_EQ(a.transfer.tiles, b.transfer.tiles);
+  EXPECT_EQ(a.transfer.lead_blocks, b.transfer.lead_blocks);
   EXPECT_EQ(a.transfer.givers, b.transfer.givers);
 }
 

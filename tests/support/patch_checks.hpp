@@ -218,48 +218,83 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
   }
 }
 
+/// What the vertices of a block take: from its runs, or from terms; never both.
+template <class Add, class RowOf>
+void read_block(const cpu::Transfer& t, const cpu::TransferBlock& block, int count,
+                const std::uint8_t* terms, const Add& add, const RowOf& row_of) {
+  std::vector<int> times(static_cast<std::size_t>(count));
+  for (int n = 0; n < block.runs; ++n) {
+    const cpu::TransferRun& run = t.runs[static_cast<std::size_t>(block.first_run + n)];
+    ASSERT_LE(run.first + run.size, count);
+    for (int k = 0; k < run.size; ++k) {
+      ++times[static_cast<std::size_t>(run.first + k)];
+      auto* const row = row_of(run.first + k);
+      ASSERT_NE(row, nullptr);
+      if (run.rows == cpu::TransferRun::kIdentity) {
+        add(*row, run.point[0] + k, 1);
+        continue;
+      }
+      const int place = run.between + k;
+      for (int r = 0; r < run.rows; ++r)
+        for (const int point : {place / 2, (place + 1) / 2})
+          add(*row, run.point[r] + point, 0.5F / static_cast<float>(run.rows));
+    }
+  }
+  auto term = static_cast<std::size_t>(block.first_term);
+  bool others = false, gaps = false;
+  for (int k = 0; k < count; ++k) {
+    if (times[static_cast<std::size_t>(k)] > 0) {
+      EXPECT_EQ(times[static_cast<std::size_t>(k)], 1);
+      EXPECT_EQ(terms[k], 0);
+      continue;
+    }
+    auto* const row = row_of(k);
+    (row != nullptr ? others : gaps) = true;
+    if (row == nullptr) {
+      EXPECT_EQ(terms[k], 0);
+      continue;
+    }
+    for (int n = 0; n < terms[k]; ++n, ++term)
+      add(*row, t.term_point[term], static_cast<float>(t.term_weight[term]) / 64);
+  }
+  EXPECT_EQ(block.others, others);
+  EXPECT_EQ(block.gaps, gaps);
+}
+
 /// Rows of the transfer, as kernels/ give the weights to each cell of a vertex.
 inline void expect_transfer(const PatchedLevel& l, const Level& next) {
   using Row = std::map<std::int32_t, float>;  // vertex of the next level, weight
   const cpu::Transfer& t = l.transfer;
-  std::vector<Row> rows(l.level->point.size()), given(rows);
+  std::vector<Row> rows(l.level->point.size());
   std::vector<int> count(rows.size());
   std::set<std::pair<std::int32_t, std::int32_t>> expected, found;  // vertex of the next, point
-  const auto read = [&](const cpu::TransferPart& part, std::int32_t vertex, std::size_t& term,
-                        int terms) {
-    ++count[vertex];
-    for (; terms > 0; --terms, ++term) {
-      ASSERT_LT(t.term_point[term], part.points.size);
-      rows[vertex][t.point[part.points.first + t.term_point[term]]] +=
-          static_cast<float>(t.term_weight[term]) / 64;
-    }
-  };
   for (std::size_t p = 0; p < l.patches.size(); ++p) {
     const cpu::TransferPart& part = t.parts[p];
     const cpu::Range& own = l.patches[p].own;
     for (std::int32_t k = part.points.first; k < part.points.end(); ++k)
       expected.insert({t.point[k], k});
-    for (std::int32_t first = own.first; first < own.end(); first += kGroup) {
-      std::size_t term = static_cast<std::size_t>(t.first_term[first / kGroup]);
-      for (std::int32_t v = first; v < first + kGroup; ++v)
-        if (l.vertex[v] >= 0)
-          read(part, l.vertex[v], term, t.terms[v]);
-        else
-          EXPECT_EQ(t.terms[v], 0);
-    }
-    std::size_t term = static_cast<std::size_t>(part.first_lead_term);
-    for (std::int32_t n = part.leads.first; n < part.leads.end(); ++n)
-      read(part, l.vertex[t.lead[n]], term, t.lead_terms[n]);
-    term = static_cast<std::size_t>(part.terms.first);
-    for (std::int32_t k = part.points.first; k < part.points.end(); ++k)
-      for (int n = 0; n < t.point_terms[k]; ++n, ++term) {
-        const std::int32_t row = t.given_row[term];
-        const std::int32_t packed =
-            row < own.size ? own.first + row : t.lead[part.leads.first + row - own.size];
-        given[l.vertex[packed]][t.point[k]] += static_cast<float>(t.given_weight[term]) / 64;
-      }
+    const auto add = [&](Row& row, int point, float weight) {
+      ASSERT_LT(point, part.points.size);
+      row[t.point[part.points.first + point]] += weight;
+    };
+    for (std::int32_t first = own.first; first < own.end(); first += kGroup)
+      read_block(t, t.tiles[first / kGroup], kGroup, t.terms.data() + first, add,
+                 [&](int k) -> Row* {
+                   const std::int32_t v = l.vertex[first + k];
+                   if (v < 0) return nullptr;
+                   ++count[v];
+                   return &rows[v];
+                 });
+    std::int32_t first = part.leads.first;
+    for (std::int32_t b = part.lead_blocks.first; b < part.lead_blocks.end(); ++b, first += kGroup)
+      read_block(t, t.lead_blocks[b], std::min(kGroup, part.leads.end() - first),
+                 t.lead_terms.data() + first, add, [&](int k) -> Row* {
+                   const std::int32_t v = l.vertex[t.lead[first + k]];
+                   ++count[v];
+                   return &rows[v];
+                 });
+    EXPECT_GE(first, part.leads.end());
   }
-  EXPECT_EQ(given, rows);
   EXPECT_EQ(count, std::vector<int>(count.size(), 1));
   for (std::int32_t v = 0; v < next.vertices(); ++v)
     for (const std::int32_t k : t.givers_of(v)) found.insert({v, k});
