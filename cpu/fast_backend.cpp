@@ -333,29 +333,78 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
   add_product(full, columns_of<P>(w), sum);
 }
 
+/// Children of some coarse cells: those of level 0 that no held component concerns, one an octant,
+/// and all others.
+class GeneralChildren {
+ public:
+  GeneralChildren(const PatchedLevel& from, const PatchedLevel& to, const std::int32_t* cells,
+                  int lanes)
+      : from_(from), to_(to), cells_(cells), lanes_(lanes) {
+    std::fill(std::begin(plain_), std::end(plain_), -1);
+    if (from.kinds.empty()) return;  // not of level 0
+    for (int k = 0; k < lanes; ++k)
+      for (const std::int32_t child : of(k)) {
+        if (from.held[child] != kFree || from.level->place[child] == Level::kPassed) continue;
+        if (std::int32_t& lane = plain(child, k); lane < 0) lane = from.lane[child];
+        any_plain_ = true;
+      }
+  }
+
+  bool any_plain() const { return any_plain_; }
+  /// [octant][kGroup]: their lanes, -1: none.
+  const std::int32_t* plain() const { return plain_; }
+  /// The n-th of the others that each lane has of an octant, -1: none. False where no lane has one.
+  bool others(int octant, int n, std::int32_t* out) {
+    bool any = false;
+    for (int k = 0; k < lanes_; ++k) {
+      out[k] = -1;
+      int left = n;
+      for (const std::int32_t child : of(k)) {
+        if (from_.level->place[child] % 8 != octant || from_.held[child] == kWhollyHeld ||
+            plain(child, k) == from_.lane[child] || left-- > 0)
+          continue;
+        out[k] = child;
+        any = true;
+        break;
+      }
+    }
+    return any;
+  }
+
+ private:
+  std::span<const std::int32_t> of(int k) const {
+    if (cells_[k] < 0) return {};
+    return to_.level->children_of(cells_[k]);
+  }
+  std::int32_t& plain(std::int32_t child, int k) {
+    return plain_[kGroup * (from_.level->place[child] % 8) + k];
+  }
+
+  const PatchedLevel &from_, &to_;
+  const std::int32_t* cells_;
+  int lanes_;
+  std::int32_t plain_[8 * kGroup];
+  bool any_plain_ = false;
+};
+
 template <class S>
 void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
                                    Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
-  const PatchedLevel& to = levels_[fine + 1].patched;
-  const Level& coarse = *to.level;
-  const std::int32_t* cells = to.cell.data() + kGroup * group + first;
+  const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
+  GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
   for (P& entry : out) entry = P(0);
-  for (std::size_t n = 0;; ++n) {
+  for (int octant = 0; octant < 8; ++octant) {
     std::int32_t child[P::kLanes];
-    bool any = false;
-    for (int k = 0; k < P::kLanes; ++k) {
-      child[k] = -1;
-      if (cells[k] < 0) continue;
-      const auto children = coarse.children_of(cells[k]);
-      if (n >= children.size()) continue;
-      any = true;
-      if (levels_[fine].patched.held[children[n]] != kWhollyHeld) child[k] = children[n];
-    }
-    if (!any) break;
-    add_general_children(levels_[fine], fine == 0, child, out);
+    for (int n = 0; children.others(octant, n, child); ++n)
+      add_general_children(levels_[fine], fine == 0, child, out);
   }
   kernels::modes_from_corners<P>(out, out);
+  if (!children.any_plain()) return;
+  P some[kEntries];
+  std::fill(std::begin(some), std::end(some), P(0));
+  merge_finest(from, values_of<S>(), scale_, children.plain(), false, some);
+  for (int e = 0; e < kEntries; ++e) out[e] += some[e];
 }
 
 template <class S>
@@ -382,7 +431,7 @@ void FastBackend<S>::coarsen(int fine) {
         return to.matrices.store(group, first, out);
       }
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
-      if (kind == kGeneral)
+      if (kind == kGeneral || kind == kGeneralPassed)
         merge_general(fine, group, first, out);
       else if (fine == 0)
         merge_finest(from.patched, values_of<S>(), scale_, children, passed, out);

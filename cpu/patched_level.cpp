@@ -163,7 +163,7 @@ class Patcher {
     }
     const bool held = out_.held[c] == kPartlyHeld;
     const bool masks = held && finer_->children.empty();  // children of level 0
-    if (masks || twice || is_loose(c)) return kGeneral;
+    if (masks || twice || is_loose(c)) return passed ? kGeneralPassed : kGeneral;
     if (held) return passed ? kHeldPassed : kHeldMerged;
     return passed ? kPassed : kMerged;
   }

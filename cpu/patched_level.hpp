@@ -54,6 +54,7 @@ enum StoredKind : std::uint16_t {
   kHeldMerged,       ///< from children above level 0, one an octant
   kHeldPassed,       ///< from one cell above level 0
   kGeneral,          ///< from cells of level 0, or two children have one octant; or a loose cell
+  kGeneralPassed,    ///< from one cell of level 0
   kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
 

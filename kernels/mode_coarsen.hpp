@@ -409,7 +409,10 @@ KERF_HD void apply_mode_row(const Matrix& A, const T (&in)[3][kCorners], T (&out
     unrolled<9>([&](auto entry) {
       constexpr int i = decltype(entry)::value / 3, k = decltype(entry)::value % 3;
       const T a = A[mode_entry(s, i, t, k)];
-      sum[i] = t == 7 && k == 0 ? a * other[0] : fma(a, other[k], sum[i]);
+      if constexpr (t == 7 && k == 0)
+        sum[i] = a * other[0];
+      else
+        sum[i] = fma(a, other[k], sum[i]);
       across[k] = fma(a, own[i], across[k]);
     });
     for (int k = 0; k < 3; ++k) out[k][t] = across[k];
@@ -418,7 +421,10 @@ KERF_HD void apply_mode_row(const Matrix& A, const T (&in)[3][kCorners], T (&out
     constexpr int i = decltype(entry)::value / 3, k = decltype(entry)::value % 3;
     if constexpr (k <= i) {
       const T a = A[mode_entry(s, i, s, k)];
-      sum[i] = s == 7 && k == 0 ? a * own[0] : fma(a, own[k], sum[i]);
+      if constexpr (s == 7 && k == 0)
+        sum[i] = a * own[0];
+      else
+        sum[i] = fma(a, own[k], sum[i]);
       if (k < i) sum[k] = fma(a, own[i], sum[k]);
     }
   });

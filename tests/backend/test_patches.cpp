@@ -29,7 +29,7 @@ using test::Problem;
 using test::ProblemOptions;
 
 Problem cut_octree(bool duplicate) {
-  LinkedOctree body(test::box_body({40, 22, 18}), 2);
+  LinkedOctree body(test::box_body({56, 22, 18}), 2);
   test::cut_plane(body, {9.3, 5.2, 4.1}, {1, 0.2, 0.3}, 5);
   ProblemOptions options;
   options.coarsest_vertices = 60;
