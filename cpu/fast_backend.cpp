@@ -10,6 +10,7 @@
 
 #include "core/solve/definite.hpp"
 #include "core/solve/spectrum.hpp"
+#include "cpu/fast_merge.hpp"
 #include "cpu/fast_state.hpp"
 
 namespace kerf::cpu {
@@ -299,6 +300,16 @@ double FastBackend<S>::subtract_elastic_force(int displacement, int out, int) {
   return subtract_forces(displacement, out, elastic_cells());
 }
 
+/// The matrices of some cells of a stored level, one a lane (-1: none).
+template <class S>
+void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
+                                     Pack<S> (&out)[kEntries]) const {
+  const FastLevel<S>& l = levels_[level];
+  l.matrices.gather(lanes, out);
+  if (level == 1)
+    add_turned(levels_[0].patched, values_of<S>(), scale_, l.patched, l.matrices, lanes, out);
+}
+
 // The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
 // there are some the way from corners has two steps.
 template <class S>
@@ -319,7 +330,7 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
     std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
     P entries[kEntries];
-    from.matrices.gather(lanes, entries);
+    gather_matrices(static_cast<int>(&from - levels_.data()), lanes, entries);
     full_from_modes(entries, full);
   }
   Weights weights[P::kLanes];
@@ -332,60 +343,6 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
   }
   add_product(full, columns_of<P>(w), sum);
 }
-
-/// Children of some coarse cells: those of level 0 that no held component concerns, one an octant,
-/// and all others.
-class GeneralChildren {
- public:
-  GeneralChildren(const PatchedLevel& from, const PatchedLevel& to, const std::int32_t* cells,
-                  int lanes)
-      : from_(from), to_(to), cells_(cells), lanes_(lanes) {
-    std::fill(std::begin(plain_), std::end(plain_), -1);
-    if (from.kinds.empty()) return;  // not of level 0
-    for (int k = 0; k < lanes; ++k)
-      for (const std::int32_t child : of(k)) {
-        if (from.held[child] != kFree || from.level->place[child] == Level::kPassed) continue;
-        if (std::int32_t& lane = plain(child, k); lane < 0) lane = from.lane[child];
-        any_plain_ = true;
-      }
-  }
-
-  bool any_plain() const { return any_plain_; }
-  /// [octant][kGroup]: their lanes, -1: none.
-  const std::int32_t* plain() const { return plain_; }
-  /// The n-th of the others that each lane has of an octant, -1: none. False where no lane has one.
-  bool others(int octant, int n, std::int32_t* out) {
-    bool any = false;
-    for (int k = 0; k < lanes_; ++k) {
-      out[k] = -1;
-      int left = n;
-      for (const std::int32_t child : of(k)) {
-        if (from_.level->place[child] % 8 != octant || from_.held[child] == kWhollyHeld ||
-            plain(child, k) == from_.lane[child] || left-- > 0)
-          continue;
-        out[k] = child;
-        any = true;
-        break;
-      }
-    }
-    return any;
-  }
-
- private:
-  std::span<const std::int32_t> of(int k) const {
-    if (cells_[k] < 0) return {};
-    return to_.level->children_of(cells_[k]);
-  }
-  std::int32_t& plain(std::int32_t child, int k) {
-    return plain_[kGroup * (from_.level->place[child] % 8) + k];
-  }
-
-  const PatchedLevel &from_, &to_;
-  const std::int32_t* cells_;
-  int lanes_;
-  std::int32_t plain_[8 * kGroup];
-  bool any_plain_ = false;
-};
 
 template <class S>
 void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
@@ -403,7 +360,7 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   if (!children.any_plain()) return;
   P some[kEntries];
   std::fill(std::begin(some), std::end(some), P(0));
-  merge_finest(from, values_of<S>(), scale_, children.plain(), false, some);
+  merge_finest(from, values_of<S>(), scale_, children.plain(), some);
   for (int e = 0; e < kEntries; ++e) out[e] += some[e];
 }
 
@@ -424,19 +381,23 @@ void FastBackend<S>::coarsen(int fine) {
     if (kind == kNoCells || kind == kIdle) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
+      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
+      if (is_of_finest(kind))
+        return to.matrices.store(group, first, gather_rotations(values_of<S>(), children));
       const auto cells = packed.cell.begin() + kGroup * g + first;
       P out[kEntries];
       if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {
         std::fill(out, out + kEntries, P(0));
         return to.matrices.store(group, first, out);
       }
-      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
       if (kind == kGeneral || kind == kGeneralPassed)
         merge_general(fine, group, first, out);
       else if (fine == 0)
-        merge_finest(from.patched, values_of<S>(), scale_, children, passed, out);
+        merge_finest(from.patched, values_of<S>(), scale_, children, out);
       else
-        merge_stored(from.matrices, children, passed, to.matrices.with_translations(group), out);
+        merge_stored<S>(
+            [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
+            children, passed, to.matrices.with_translations(group), out);
       to.matrices.store(group, first, out);
     });
   }
@@ -487,10 +448,18 @@ void FastBackend<S>::prepare(int level) {
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
       if (packed.idle(group)) continue;
-      if (level == 0)
-        add_finest_diagonals(packed, values_of<S>(), scale_, folds_, group, to);
-      else
+      if (level > 0 && !l.matrices.is_turned(group)) {
         add_stored_diagonals(packed, l.matrices, folds_, group, to);
+        continue;
+      }
+      const CellKind& kind = finest_kind(level, group);
+      add_element_diagonals(
+          packed, kind, values_of<S>().materials[kind.material].modes, scale_, folds_, group,
+          [&](int first) {
+            return level == 0 ? values_of<S>().quaternion(group, first)
+                              : l.matrices.rotation(group, first);
+          },
+          to);
     }
     invert_own(l, patch, to);
     for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
@@ -530,7 +499,7 @@ void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<d
   }
   Pack<S> entries[kEntries];
   P exact[kEntries];
-  levels_[level].matrices.gather(lanes, entries);
+  gather_matrices(level, lanes, entries);
   for (int e = 0; e < kEntries; ++e)
     for (int k = 0; k < P::kLanes; ++k) exact[e].set(k, static_cast<double>(entries[e][k]));
   full_from_modes(exact, full);

@@ -116,18 +116,18 @@ struct GroupFold {
   bool changes(int slot) const { return ((folded >> slot) & 1) != 0; }
 };
 
-/// Diagonal blocks at the vertices of a group of level 0. Lanes without a cell have blocks too, at
-/// the point that is nothing.
-template <class S>
-void add_finest_diagonals(const PatchedLevel& level, const FinestValues<S>& values,
-                          const OperatorScale& scale, const SlotTable<S>& table, std::size_t group,
-                          const BlockPoints<S>& to) {
+/// Diagonal blocks at the vertices of a group of cells of level 0, there or as another level has
+/// them: quaternion(first lane). Lanes without a cell have blocks too, at the point that is
+/// nothing.
+template <class S, class Quaternion>
+void add_element_diagonals(const PatchedLevel& level, const CellKind& kind,
+                           const kernels::ModeConstants<Pack<S>>& constants,
+                           const OperatorScale& scale, const SlotTable<S>& table, std::size_t group,
+                           const Quaternion& quaternion, const BlockPoints<S>& to) {
   using P = Pack<S>;
-  const CellKind& kind = level.kinds[level.kind[group]];
-  const kernels::ModeConstants<P>& constants = values.materials[kind.material].modes;
   const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
   for_packs<S>([&](int first) {
-    const auto R = kernels::to_matrix(values.quaternion(group, first));
+    const auto R = kernels::to_matrix(quaternion(first));
     kernels::Sym3<P> blocks[8];
     kernels::finest_diagonal_blocks(R, stiffness, mass, constants, blocks);
     if (!level.folded(group)) {

@@ -256,6 +256,13 @@ class FastBackend final : public Backend {
   void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
                      Pack<double> (&full)[24][24]) const;
   void assemble_coarsest(bool definite);
+  /// What the cells of a group are, of level 0 or passed on from there.
+  const CellKind& finest_kind(int level, std::size_t group) const {
+    const int kind = levels_[level].patched.kind[group];
+    return levels_[0].patched.kinds[level == 0 ? kind : kind - kOfFinest];
+  }
+  void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
+                       Pack<S> (&out)[kEntries]) const;
   void add_general_children(const FastLevel<S>& from, bool finest,
                             const std::int32_t (&child)[Pack<S>::kLanes],
                             Pack<S> (&sum)[kEntries]) const;
@@ -371,7 +378,11 @@ void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y
   if (level == 0) {
     finest_products(l.patched, values_of<T>(), scale_, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
-    stored_products(l.patched, l.matrices, group, x, y);
+    if (!l.matrices.is_turned(group)) return stored_products(l.patched, l.matrices, group, x, y);
+    const CellKind& kind = finest_kind(level, group);
+    element_products(
+        l.patched, kind, values_of<S>().materials[kind.material], scale_, group,
+        [&](int first) { return l.matrices.rotation(group, first); }, x, y);
   }
 }
 

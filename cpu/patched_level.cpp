@@ -146,7 +146,8 @@ class Patcher {
       last_kind_ =
           static_cast<std::size_t>(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
     if (last_kind_ == kinds.size()) kinds.push_back(kind);
-    expects(last_kind_ < 65535, "the body has more than 65535 kinds of cells");
+    constexpr std::size_t kMost = kNoCells - kOfFinest;
+    expects(last_kind_ < kMost, text("the body has more than ", kMost, " kinds of cells"));
     return static_cast<std::uint16_t>(last_kind_);
   }
 
@@ -165,6 +166,9 @@ class Patcher {
     const bool masks = held && finer_->children.empty();  // children of level 0
     if (masks || twice || is_loose(c)) return passed ? kGeneralPassed : kGeneral;
     if (held) return passed ? kHeldPassed : kHeldMerged;
+    if (passed && finer_->children.empty())
+      return static_cast<std::uint16_t>(kOfFinest +
+                                        finer_->kind[finer_->lane[children[0]] / kGroup]);
     return passed ? kPassed : kMerged;
   }
 

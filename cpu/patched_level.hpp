@@ -55,8 +55,12 @@ enum StoredKind : std::uint16_t {
   kHeldPassed,       ///< from one cell above level 0
   kGeneral,          ///< from cells of level 0, or two children have one octant; or a loose cell
   kGeneralPassed,    ///< from one cell of level 0
+  kOfFinest = 16,    ///< and on: from one cell of level 0 of kind - kOfFinest, which is not stored
   kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
+constexpr bool is_of_finest(std::uint16_t kind) { return kind >= kOfFinest && kind != kNoCells; }
+/// Whether cells of level 0 below are partly held, or matrices are made as if they were.
+constexpr bool is_held(std::uint16_t kind) { return kind >= kHeldMerged && kind < kOfFinest; }
 
 /// Whether components of the vertices of a cell are held. A wholly held cell takes no part in any
 /// product of the operator, so its matrix is zero to the levels above. Forces ask it too.

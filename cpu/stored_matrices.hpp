@@ -13,6 +13,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -21,6 +22,7 @@
 
 #include "cpu/patched_level.hpp"
 #include "kernels/mode_coarsen.hpp"
+#include "kernels/rotation.hpp"
 
 namespace kerf::cpu {
 
@@ -149,19 +151,40 @@ class StoredMatrices {
     traits_.clear();
     std::size_t plain = 0, codes = 0;
     for (std::size_t g = 0; g < level.groups(); ++g) {
-      const bool held = level.kind[g] >= kHeldMerged;
-      const bool is_coded = coded && std::is_same_v<S, float> && !held;
+      const bool held = is_held(level.kind[g]), turned = is_of_finest(level.kind[g]);
+      const bool is_coded = coded && std::is_same_v<S, float> && !held && !turned;
       const bool full = with_mass || held;
       const bool none = level.kind[g] == kNoCells || level.kind[g] == kIdle;
       traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0) |
-                                                  (none ? kNone : 0)));
+                                                  (none ? kNone : 0) | (turned ? kTurned : 0)));
       std::size_t& size = is_coded ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
-      if (!none) size += full ? kernels::kEntries : kernels::kModeEntries;
+      if (!none) size += turned ? 4 : full ? kernels::kEntries : kernels::kModeEntries;
     }
     plain_.resize(kGroup * plain);
     codes_.resize(kGroup * codes);
     unit_.resize(codes > 0 ? level.cell.size() : 0);
+  }
+
+  /// Of cells of level 0 that are passed on, rotations alone are stored.
+  bool is_turned(std::size_t group) const { return (traits_[group] & kTurned) != 0; }
+  void store(std::size_t group, int first, const kernels::Quat<P>& q) {
+    S* const to = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
+    store_pack(to, q.w);
+    store_pack(to + kGroup, q.x);
+    store_pack(to + 2 * kGroup, q.y);
+    store_pack(to + 3 * kGroup, q.z);
+  }
+  kernels::Quat<P> rotation(std::size_t group, int first) const {
+    const S* const from = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
+    prefetch(from, 4 * kGroup, 4 * kGroup);
+    return {load_pack(from), load_pack(from + kGroup), load_pack(from + 2 * kGroup),
+            load_pack(from + 3 * kGroup)};
+  }
+
+  std::array<S, 4> rotation_of(std::size_t lane) const {
+    const S* const q = plain_.data() + kGroup * std::size_t{begin_[lane / kGroup]} + lane % kGroup;
+    return {q[0], q[kGroup], q[2 * kGroup], q[3 * kGroup]};
   }
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
@@ -200,7 +223,8 @@ class StoredMatrices {
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored. Entry
+  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored, as for
+  /// those that are turned. Entry
   /// by entry, so that those of the lanes come from memory side by side.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     int count = 0;
@@ -215,7 +239,7 @@ class StoredMatrices {
       if (lanes[k] < 0) continue;
       const auto lane = static_cast<std::size_t>(lanes[k]);
       const std::size_t group = lane / kGroup;
-      if ((traits_[group] & (kNone | kCoded)) != 0) continue;
+      if ((traits_[group] & (kNone | kCoded | kTurned)) != 0) continue;
       plain[size++] = {k, entries_of(group),
                        plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup};
       most = std::max(most, entries_of(group));
@@ -227,7 +251,7 @@ class StoredMatrices {
   }
 
  private:
-  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4;
+  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4, kTurned = 8;
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
   int entries_of(std::size_t group) const {
     return with_translations(group) ? kernels::kEntries : kernels::kModeEntries;

@@ -207,8 +207,9 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
     }
     ASSERT_EQ(l.held[c], wholly ? cpu::kWhollyHeld : partly ? cpu::kPartlyHeld : cpu::kFree);
     const std::uint16_t kind = l.kind[lane / kGroup];
-    EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || kind >= cpu::kGeneral, kind >= cpu::kHeldMerged);
-    if (kind >= cpu::kGeneral) continue;
+    const bool general = kind == cpu::kGeneral || kind == cpu::kGeneralPassed;
+    EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || general, cpu::is_held(kind));
+    if (general) continue;
     for (std::size_t o = 0; o < 8; ++o)
       if (const std::int32_t at =
               l.children[8 * kGroup * (lane / kGroup) + kGroup * o + lane % kGroup];
