@@ -21,6 +21,19 @@ struct BlockPoints {
     add_to_points(upper, points, kernels::Vec3<Pack<S>>{b.xx, b.xy, b.xz});
     add_to_points(lower, points, kernels::Vec3<Pack<S>>{b.yy, b.yz, b.zz});
   }
+  /// At the corners of cells that lie like this.
+  template <RowKind kKind>
+  void add(const std::uint16_t* points, const kernels::Sym3<Pack<S>> (&b)[8]) const {
+    if constexpr (kKind == kScattered) {
+      for (int i = 0; i < 8; ++i) add(points + kGroup * i, b[i]);
+      return;
+    }
+    kernels::Vec3<Pack<S>> half[8];
+    for (int i = 0; i < 8; ++i) half[i] = {b[i].xx, b[i].xy, b[i].xz};
+    add_corners<kKind>(points, half, upper);
+    for (int i = 0; i < 8; ++i) half[i] = {b[i].yy, b[i].yz, b[i].zz};
+    add_corners<kKind>(points, half, lower);
+  }
 };
 
 /// What folds do to slots, by fold code: each of the 144 that there are has a place.
@@ -126,14 +139,11 @@ void add_element_diagonals(const PatchedLevel& level, const CellKind& kind,
                            const Quaternion& quaternion, const BlockPoints<S>& to) {
   using P = Pack<S>;
   const P stiffness = P(scale.stiffness * kind.stiffness), mass = P(scale.mass * kind.mass);
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     const auto R = kernels::to_matrix(quaternion(first));
     kernels::Sym3<P> blocks[8];
     kernels::finest_diagonal_blocks(R, stiffness, mass, constants, blocks);
-    if (!level.folded(group)) {
-      for (int i = 0; i < 8; ++i) to.add(corner_points(level, group, first, i), blocks[i]);
-      return;
-    }
+    if (!level.folded(group)) return to.template add<row()>(points, blocks);
     const GroupFold<S> fold(level, table, group, first);
     for (int slot = 0; slot < 8; ++slot) {
       if (fold.changes(slot)) {
@@ -151,15 +161,16 @@ template <class S>
 void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& matrices,
                           const SlotTable<S>& table, std::size_t group, const BlockPoints<S>& to) {
   using P = Pack<S>;
-  const auto add = [&](const std::uint16_t* points, const P& unit, const kernels::Sym3<P>& b) {
-    to.add(points, {unit * b.xx, unit * b.xy, unit * b.xz, unit * b.yy, unit * b.yz, unit * b.zz});
+  const auto scale = [](const P& unit, kernels::Sym3<P>& b) {
+    b = {unit * b.xx, unit * b.xy, unit * b.xz, unit * b.yy, unit * b.yz, unit * b.zz};
   };
-  for_packs<S>([&](int first) {
+  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
     matrices.read(group, first, [&](const auto& entries, const P& unit, auto translations) {
       kernels::Sym3<P> blocks[8];
       if (!level.folded(group)) {
         kernels::mode_diagonal_blocks<translations()>(entries, blocks);
-        for (int i = 0; i < 8; ++i) add(corner_points(level, group, first, i), unit, blocks[i]);
+        for (kernels::Sym3<P>& block : blocks) scale(unit, block);
+        to.template add<row()>(points, blocks);
         return;
       }
       P all[kernels::kStoredEntries<translations()>];
@@ -172,7 +183,8 @@ void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& ma
           table.modes(fold.places, slot, m);
           kernels::stored_slot_block<translations()>(all, m, blocks[slot]);
         }
-        add(fold.slots + kGroup * slot, unit, blocks[slot]);
+        scale(unit, blocks[slot]);
+        to.add(fold.slots + kGroup * slot, blocks[slot]);
       }
     });
   });

@@ -77,13 +77,6 @@ struct FinestValues {
   }
 };
 
-/// Points of a corner of a group, of the lanes from `first` on.
-inline const std::uint16_t* corner_points(const PatchedLevel& level, std::size_t group, int first,
-                                          int corner) {
-  return level.corners.data() + 8 * kGroup * group + kGroup * static_cast<std::size_t>(corner) +
-         static_cast<std::size_t>(first);
-}
-
 /// Cells of a row within a pack.
 template <RowKind kKind, class S>
 inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
