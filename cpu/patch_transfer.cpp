@@ -208,13 +208,14 @@ TransferRun TransferRows::longest_run(std::size_t first, std::size_t end) const 
 /// Some vertices: runs of them, and the terms of the others.
 TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, TransferDraft& out,
                                       std::vector<std::uint8_t>& terms) {
-  constexpr int kShortest = 8;  // of fewer, terms are as fast
+  constexpr std::size_t kShortest = 8;  // of fewer, terms are as fast
   TransferBlock block;
   block.first_run = size_of(out.runs.size());
   block.first_term = size_of(out.term_point.size());
   const std::size_t end = first + count;
   for (std::size_t n = first; n < end;) {
-    TransferRun run = longest_run(n, end);
+    TransferRun run;
+    if (n + kShortest <= end) run = longest_run(n, end);
     if (run.size >= kShortest) {
       run.first = static_cast<std::uint8_t>(n - first);
       out.runs.push_back(run);
@@ -223,11 +224,14 @@ TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, Tran
       n += run.size;
       continue;
     }
-    const Row one = row(n++);
-    terms.push_back(static_cast<std::uint8_t>(one.count));
-    out.term_point.insert(out.term_point.end(), one.point, one.point + one.count);
-    out.term_weight.insert(out.term_weight.end(), one.weight, one.weight + one.count);
-    (one.count > 0 ? block.others : block.gaps) = true;
+    // What ends a run soon ends those soon that start within it.
+    for (const std::size_t stop = n + std::max<std::size_t>(run.size, 1); n < stop; ++n) {
+      const Row one = row(n);
+      terms.push_back(static_cast<std::uint8_t>(one.count));
+      out.term_point.insert(out.term_point.end(), one.point, one.point + one.count);
+      out.term_weight.insert(out.term_weight.end(), one.weight, one.weight + one.count);
+      (one.count > 0 ? block.others : block.gaps) = true;
+    }
   }
   return block;
 }
@@ -256,6 +260,8 @@ TransferDraft TransferRows::operator()(std::int32_t n) {
   out.terms.reserve(own);
   out.tiles.reserve(own / kGroup);
   out.runs.reserve(all / 8);
+  out.term_point.reserve(all);
+  out.term_weight.reserve(all);
   for (std::size_t first = 0; first < own; first += kGroup)
     out.tiles.push_back(add_block(first, kGroup, out, out.terms));
   for (std::size_t first = own; first < all; first += kGroup)
