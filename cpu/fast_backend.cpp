@@ -310,17 +310,16 @@ void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack
     add_turned(levels_[0].patched, values_of<S>(), scale_, l.patched, l.matrices, lanes, out);
 }
 
-// The n-th children of the coarse cells in the lanes. Held components are those of slots, so where
-// there are some the way from corners has two steps.
+// Some children of the coarse cells in the lanes, one each. Held components are those of slots, so
+// where there are some the way from corners has two steps.
 template <class S>
-void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
-                                          const std::int32_t (&child)[Pack<S>::kLanes],
+void FastBackend<S>::add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
                                           Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
-  const PatchedLevel& packed = from.patched;
+  const PatchedLevel& packed = levels_[fine].patched;
   P full[24][24];
   bool over_slots = false;
-  if (finest) {
+  if (fine == 0) {
     const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
     corner_matrices(packed, values_of<S>(), lanes, full);
     over_slots = lanes.any_held;
@@ -330,7 +329,7 @@ void FastBackend<S>::add_general_children(const FastLevel<S>& from, bool finest,
     std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
     P entries[kEntries];
-    gather_matrices(static_cast<int>(&from - levels_.data()), lanes, entries);
+    gather_matrices(fine, lanes, entries);
     full_from_modes(entries, full);
   }
   Weights weights[P::kLanes];
@@ -350,13 +349,16 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   using P = Pack<S>;
   const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
   GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
+  bool any_other = false;
   for (P& entry : out) entry = P(0);
   for (int octant = 0; octant < 8; ++octant) {
     std::int32_t child[P::kLanes];
-    for (int n = 0; children.others(octant, n, child); ++n)
-      add_general_children(levels_[fine], fine == 0, child, out);
+    for (int n = 0; children.others(octant, n, child); ++n) {
+      add_general_children(fine, child, out);
+      any_other = true;
+    }
   }
-  kernels::modes_from_corners<P>(out, out);
+  if (any_other) kernels::modes_from_corners<P>(out, out);
   if (!children.any_plain()) return;
   P some[kEntries];
   std::fill(std::begin(some), std::end(some), P(0));

@@ -12,15 +12,12 @@
 #include "core/backend.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/stored_matrices.hpp"
-#include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/hex_element.hpp"
 #include "kernels/host_device.hpp"
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
-#include "kernels/residual.hpp"
 #include "kernels/rotation.hpp"
-#include "kernels/transfer.hpp"
 
 namespace kerf::cpu {
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 
 #include "cpu/fast_kernels.hpp"
 #include "cpu/general_children.hpp"
@@ -287,14 +288,17 @@ void add_turned(const PatchedLevel& finest, const FinestValues<S>& values,
                 const StoredMatrices<S>& matrices, const std::int32_t (&lanes)[Pack<S>::kLanes],
                 Pack<S> (&sum)[kEntries]) {
   constexpr int kLanes = Pack<S>::kLanes;
+  const auto is_turned = [&](std::int32_t lane) {
+    return lane >= 0 && matrices.is_turned(static_cast<std::size_t>(lane / kGroup));
+  };
+  if (std::none_of(std::begin(lanes), std::end(lanes), is_turned)) return;
   for (std::size_t m = 0; m < values.materials.size(); ++m) {
     alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes] = {}, mass[kLanes] = {};
     bool any = false;
     for (int k = 0; k < kLanes; ++k) {
       q[0][k] = 1;
       q[1][k] = q[2][k] = q[3][k] = 0;
-      if (lanes[k] < 0 || !matrices.is_turned(static_cast<std::size_t>(lanes[k] / kGroup)))
-        continue;
+      if (!is_turned(lanes[k])) continue;
       const auto group = static_cast<std::size_t>(lanes[k] / kGroup);
       const CellKind& kind = finest.kinds[level.kind[group] - kOfFinest];
       if (kind.material != m) continue;
@@ -306,11 +310,11 @@ void add_turned(const PatchedLevel& finest, const FinestValues<S>& values,
     }
     if (!any) continue;
     Pack<S> some[kEntries];
-    Pack<S>* const to = some;
     kernels::finest_mode_matrix(
         kernels::to_matrix(kernels::Quat<Pack<S>>{load_pack(q[0]), load_pack(q[1]), load_pack(q[2]),
                                                   load_pack(q[3])}),
-        load_pack(stiffness), load_pack(mass), values.materials[m].modes, to);
+        load_pack(stiffness), load_pack(mass), values.materials[m].modes,
+        static_cast<Pack<S>*>(some));
     for (int e = 0; e < kEntries; ++e) sum[e] += some[e];
   }
 }

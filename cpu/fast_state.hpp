@@ -263,8 +263,7 @@ class FastBackend final : public Backend {
   }
   void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
-  void add_general_children(const FastLevel<S>& from, bool finest,
-                            const std::int32_t (&child)[Pack<S>::kLanes],
+  void add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
                             Pack<S> (&sum)[kEntries]) const;
   void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
   /// Of Chebyshev: the first has no direction yet; the second here is that behind one from zero.

@@ -22,7 +22,7 @@ class GeneralChildren {
     for (int k = 0; k < lanes; ++k)
       for (const std::int32_t child : of(k)) {
         if (from.held[child] != kFree || from.level->place[child] == Level::kPassed) continue;
-        if (std::int32_t& lane = plain(child, k); lane < 0) lane = from.lane[child];
+        if (std::int32_t& lane = plain_[plain_place(child, k)]; lane < 0) lane = from.lane[child];
         any_plain_ = true;
       }
   }
@@ -31,14 +31,14 @@ class GeneralChildren {
   /// [octant][kGroup]: their lanes, -1: none.
   const std::int32_t* plain() const { return plain_; }
   /// The n-th of the others that each lane has of an octant, -1: none. False where no lane has one.
-  bool others(int octant, int n, std::int32_t* out) {
+  bool others(int octant, int n, std::int32_t* out) const {
     bool any = false;
     for (int k = 0; k < lanes_; ++k) {
       out[k] = -1;
       int left = n;
       for (const std::int32_t child : of(k)) {
         if (from_.level->place[child] % 8 != octant || from_.held[child] == kWhollyHeld ||
-            plain(child, k) == from_.lane[child] || left-- > 0)
+            plain_[plain_place(child, k)] == from_.lane[child] || left-- > 0)
           continue;
         out[k] = child;
         any = true;
@@ -53,8 +53,8 @@ class GeneralChildren {
     if (cells_[k] < 0) return {};
     return to_.level->children_of(cells_[k]);
   }
-  std::int32_t& plain(std::int32_t child, int k) {
-    return plain_[kGroup * (from_.level->place[child] % 8) + k];
+  int plain_place(std::int32_t child, int k) const {
+    return kGroup * (from_.level->place[child] % 8) + k;
   }
 
   const PatchedLevel &from_, &to_;

@@ -48,13 +48,13 @@ inline constexpr std::uint16_t kNothing = 0;
 /// How the matrix of a cell of a stored level comes about; cells of a group are alike.
 enum StoredKind : std::uint16_t {
   kMerged,  ///< from children without held components, one an octant
-  kPassed,  ///< from one cell of the same place and size, without held components
+  kPassed,  ///< from one cell of the same place and size above level 0, without held components
   kIdle,    ///< wholly held: its matrix is zero, and not stored
   // Where some cell of level 0 below is partly held:
   kHeldMerged,       ///< from children above level 0, one an octant
   kHeldPassed,       ///< from one cell above level 0
   kGeneral,          ///< from cells of level 0, or two children have one octant; or a loose cell
-  kGeneralPassed,    ///< from one cell of level 0
+  kGeneralPassed,    ///< the same from one cell
   kOfFinest = 16,    ///< and on: from one cell of level 0 of kind - kOfFinest, which is not stored
   kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
@@ -134,8 +134,6 @@ struct TransferRun {
   std::uint8_t between = 0;     // 1: the first vertex lies between two points
   std::uint16_t point[4] = {};  // the first one of each row
 
-  /// Points of a row that it takes from.
-  int points() const { return rows == kIdentity ? size : (size + between) / 2 + 1; }
   friend bool operator==(const TransferRun&, const TransferRun&) = default;
 };
 

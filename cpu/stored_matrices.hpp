@@ -3,7 +3,9 @@
 // The cell matrices of a stored level in the basis of modes (kernels/mode_coarsen.hpp), the
 // cells of a group side by side.
 //
-// Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
+// Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone;
+// one
+//         of cells of level 0 that are passed on, the four components of their rotations.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
 //         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
 //         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.
@@ -223,9 +225,8 @@ class StoredMatrices {
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored, as for
-  /// those that are turned. Entry
-  /// by entry, so that those of the lanes come from memory side by side.
+  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored or the
+  /// cell is turned. Entry by entry, so that those of the lanes come from memory side by side.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     int count = 0;
     if constexpr (std::is_same_v<S, float>) count = gather_codes(lanes, out);

@@ -15,9 +15,12 @@
 
 namespace kerf {
 
+/// Of all types.
+inline std::atomic<unsigned> large_arrays_made{0};
+
 /// Asks Linux for pages of 2 MB where an array fills some: the processor finds the addresses of
-/// these in its tables, which pages of 4 KB overflow. What is left at the end has small pages, so
-/// that the process holds no more memory than without.
+/// these in its tables, which pages of 4 KB overflow. What is left at the end has small pages; room
+/// that is reserved and not used yet may be held up to the end of a page.
 /// Arrays  start at different places within a page: the same places of arrays that are read
 ///         together would compete for the same lines of the caches.
 template <class T>
@@ -32,8 +35,7 @@ struct LargePageAllocator {
     if (n > (std::size_t(-1) - kPage) / sizeof(T)) throw std::bad_array_new_length();
     const std::size_t bytes = n * sizeof(T);
     if (!is_large(bytes)) return static_cast<T*>(::operator new(bytes));
-    static std::atomic<unsigned> made{0};
-    const std::size_t shift = made++ % kPlaces * kStep;
+    const std::size_t shift = large_arrays_made++ % kPlaces * kStep;
     auto* const page = static_cast<std::byte*>(::operator new(shift + bytes, kAlign));
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
     madvise(page, (shift + bytes) / kPage * kPage, MADV_HUGEPAGE);  // may be refused

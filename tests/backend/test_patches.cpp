@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -51,6 +52,32 @@ TEST(Patches, AreWholeWhenMade) {
   EXPECT_GT(in_rows, 800);
   EXPECT_GT(levels[0].patches.size(), 4u);
   EXPECT_GT(levels[0].shared, 100);
+}
+
+TEST(Patches, HaveRunsOfAllKinds) {
+  std::set<std::pair<int, int>> own, shared;  // rows, whether the first vertex lies between points
+  const auto count = [&](const Problem& p) {
+    for (const PatchedLevel& l : patches_of(p.hierarchy, 1)) {
+      const cpu::Transfer& t = l.transfer;
+      const auto add = [&](const cpu::TransferBlock& block, auto& to) {
+        for (int n = 0; n < block.runs; ++n) {
+          const cpu::TransferRun& run = t.runs[static_cast<std::size_t>(block.first_run + n)];
+          to.insert({run.rows, run.between});
+        }
+      };
+      for (const cpu::TransferBlock& block : t.tiles) add(block, own);
+      for (const cpu::TransferBlock& block : t.lead_blocks) add(block, shared);
+    }
+  };
+  ProblemOptions options;
+  options.max_levels = 2;
+  options.with_oracle = false;
+  count({LinkedOctree(test::box_body({64, 48, 40}), 0), options});
+  const std::set<std::pair<int, int>> all{{1, 0}, {1, 1}, {2, 0}, {2, 1}, {4, 0}, {4, 1}};
+  EXPECT_EQ(own, all);
+  EXPECT_GE(shared.size(), 4u);
+  count({LinkedOctree(test::box_body({64, 48, 40}), 2), options});
+  EXPECT_TRUE(own.contains({cpu::TransferRun::kIdentity, 0}));
 }
 
 // The first patch of a body of 64^3 cells would have 8192, each with eight points of its own here.

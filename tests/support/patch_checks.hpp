@@ -207,6 +207,13 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
     }
     ASSERT_EQ(l.held[c], wholly ? cpu::kWhollyHeld : partly ? cpu::kPartlyHeld : cpu::kFree);
     const std::uint16_t kind = l.kind[lane / kGroup];
+    if (cpu::is_of_finest(kind)) {
+      ASSERT_TRUE(finer.children.empty());
+      const std::int32_t child = l.level->children_of(c)[0];
+      EXPECT_EQ(kind - cpu::kOfFinest, finer.kind[finer.lane[child] / kGroup]);
+      EXPECT_EQ(finer.level->place[child], Level::kPassed);
+      EXPECT_EQ(l.level->children_of(c).size(), 1u);
+    }
     const bool general = kind == cpu::kGeneral || kind == cpu::kGeneralPassed;
     EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || general, cpu::is_held(kind));
     if (general) continue;
