@@ -384,8 +384,11 @@ void FastBackend<S>::coarsen(int fine) {
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
-      if (is_of_finest(kind))
-        return to.matrices.store(group, first, gather_rotations(values_of<S>(), children));
+      if (is_of_finest(kind)) {
+        kernels::FinestChild<P> child;
+        load_elements(from.patched, values_of<S>(), scale_, children, kAnyMaterial, child);
+        return to.matrices.store(group, first, child.rotation);
+      }
       const auto cells = packed.cell.begin() + kGroup * g + first;
       P out[kEntries];
       if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {

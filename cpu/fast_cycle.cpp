@@ -248,19 +248,11 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
   FastLevel<S>& l = levels_[level];
   changed(level, out);
   with_types(l.vectors[in], l.vectors[out], [&](const auto* from, auto* to) {
-    using T = std::decay_t<decltype(*to)>;
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
-      alignas(kPackBytes) S r[kTileScalars], z[kTileScalars];
-      for (std::size_t i = 0; i < kTileScalars; ++i)
-        r[i] = static_cast<S>(from[kTileScalars * tile + i]);
       for_packs<S>([&](int first) {
-        store_tile(z, 0, first,
-                   l.times_inverse(tile, first,
-                                   {tile_pack<S>(r, 0, 0, first), tile_pack<S>(r, 0, 1, first),
-                                    tile_pack<S>(r, 0, 2, first)}));
+        store_tile_as(to, tile, first,
+                      l.times_inverse(tile, first, load_tile_as<S>(from, tile, first)));
       });
-      for (std::size_t i = 0; i < kTileScalars; ++i)
-        to[kTileScalars * tile + i] = static_cast<T>(z[i]);
     });
   });
 }

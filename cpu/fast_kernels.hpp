@@ -56,9 +56,7 @@ struct FinestValues {
       std::fill_n(rotation.begin() + 4 * kGroup * g, kGroup, S(1));
   }
   kernels::Quat<Pack<S>> quaternion(std::size_t group, int first_lane) const {
-    const S* q = rotation.data() + 4 * kGroup * group + first_lane;
-    return {load_pack(q), load_pack(q + kGroup), load_pack(q + 2 * kGroup),
-            load_pack(q + 3 * kGroup)};
+    return load_quaternion(rotation.data() + 4 * kGroup * group + first_lane);
   }
   /// Asks memory for those that are needed a few groups later.
   void prefetch_behind(std::size_t group) const {
@@ -66,11 +64,7 @@ struct FinestValues {
     prefetch(rotation.data(), kScalars * (group + kAhead), kScalars);
   }
   void set_quaternion(std::size_t group, int first_lane, const kernels::Quat<Pack<S>>& q) {
-    S* to = rotation.data() + 4 * kGroup * group + first_lane;
-    store_pack(to, q.w);
-    store_pack(to + kGroup, q.x);
-    store_pack(to + 2 * kGroup, q.y);
-    store_pack(to + 3 * kGroup, q.z);
+    store_quaternion(rotation.data() + 4 * kGroup * group + first_lane, q);
   }
 };
 

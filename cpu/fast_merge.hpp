@@ -5,9 +5,7 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <iterator>
 
 #include "cpu/fast_kernels.hpp"
 #include "cpu/general_children.hpp"
@@ -229,9 +227,9 @@ inline Weights child_weights(const Level& level, std::int32_t child, bool slots)
 
 /// Which materials the children in some lanes of a group are of, as bits.
 template <class S>
-std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* children) {
+std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* children, int octants) {
   std::uint64_t out = 0;
-  for (int octant = 0; octant < 8; ++octant)
+  for (int octant = 0; octant < octants; ++octant)
     for (int k = 0; k < Pack<S>::kLanes; ++k)
       if (const std::int32_t lane = children[kGroup * octant + k]; lane >= 0)
         out |= std::uint64_t{1} << (level.kinds[level.kind[lane / kGroup]].material % 64);
@@ -244,7 +242,7 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
                   const OperatorScale& scale, const std::int32_t* children,
                   Pack<S> (&out)[kEntries]) {
   using P = Pack<S>;
-  const std::uint64_t materials = materials_of<S>(level, children);
+  const std::uint64_t materials = materials_of<S>(level, children, 8);
   if (materials == 0)  // all children are wholly held
     for (P& entry : out) entry = P(0);
   bool first = true;
@@ -268,53 +266,29 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
   }
 }
 
-/// Rotations of the cells of level 0 in some lanes (-1: none).
-template <class S>
-kernels::Quat<Pack<S>> gather_rotations(const FinestValues<S>& values, const std::int32_t* lanes) {
-  alignas(kPackBytes) S q[4][Pack<S>::kLanes];
-  for (int k = 0; k < Pack<S>::kLanes; ++k) {
-    const std::array<S, 4> one =
-        lanes[k] < 0 ? std::array<S, 4>{S(1)} : values.at(static_cast<std::size_t>(lanes[k]));
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = one[c];
-  }
-  return {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
-}
-
 /// Adds the matrices of cells in some lanes (-1: none) of level 1 of which only rotations are
-/// stored.
+/// stored, from the cells of level 0 that they are.
 template <class S>
 void add_turned(const PatchedLevel& finest, const FinestValues<S>& values,
                 const OperatorScale& scale, const PatchedLevel& level,
                 const StoredMatrices<S>& matrices, const std::int32_t (&lanes)[Pack<S>::kLanes],
                 Pack<S> (&sum)[kEntries]) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  const auto is_turned = [&](std::int32_t lane) {
-    return lane >= 0 && matrices.is_turned(static_cast<std::size_t>(lane / kGroup));
-  };
-  if (std::none_of(std::begin(lanes), std::end(lanes), is_turned)) return;
-  for (std::size_t m = 0; m < values.materials.size(); ++m) {
-    alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes] = {}, mass[kLanes] = {};
-    bool any = false;
-    for (int k = 0; k < kLanes; ++k) {
-      q[0][k] = 1;
-      q[1][k] = q[2][k] = q[3][k] = 0;
-      if (!is_turned(lanes[k])) continue;
-      const auto group = static_cast<std::size_t>(lanes[k] / kGroup);
-      const CellKind& kind = finest.kinds[level.kind[group] - kOfFinest];
-      if (kind.material != m) continue;
-      const std::array<S, 4> one = matrices.rotation_of(static_cast<std::size_t>(lanes[k]));
-      for (std::size_t c = 0; c < 4; ++c) q[c][k] = one[c];
-      stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
-      mass[k] = static_cast<S>(scale.mass * kind.mass);
-      any = true;
-    }
-    if (!any) continue;
+  std::int32_t children[Pack<S>::kLanes];
+  for (int k = 0; k < Pack<S>::kLanes; ++k) {
+    children[k] = -1;
+    if (lanes[k] < 0) continue;
+    const auto group = static_cast<std::size_t>(lanes[k] / kGroup);
+    if (matrices.is_turned(group))
+      children[k] = level.children[8 * kGroup * group + lanes[k] % kGroup];
+  }
+  const std::uint64_t materials = materials_of<S>(finest, children, 1);
+  for (std::size_t m = 0; m < values.materials.size() && materials != 0; ++m) {
+    if (((materials >> (m % 64)) & 1) == 0) continue;
+    kernels::FinestChild<Pack<S>> child;
+    load_elements(finest, values, scale, children, static_cast<int>(m), child);
     Pack<S> some[kEntries];
-    kernels::finest_mode_matrix(
-        kernels::to_matrix(kernels::Quat<Pack<S>>{load_pack(q[0]), load_pack(q[1]), load_pack(q[2]),
-                                                  load_pack(q[3])}),
-        load_pack(stiffness), load_pack(mass), values.materials[m].modes,
-        static_cast<Pack<S>*>(some));
+    kernels::finest_mode_matrix(kernels::to_matrix(child.rotation), child.stiffness, child.mass,
+                                values.materials[m].modes, static_cast<Pack<S>*>(some));
     for (int e = 0; e < kEntries; ++e) sum[e] += some[e];
   }
 }

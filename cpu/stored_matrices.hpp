@@ -3,9 +3,8 @@
 // The cell matrices of a stored level in the basis of modes (kernels/mode_coarsen.hpp), the
 // cells of a group side by side.
 //
-// Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone;
-// one
-//         of cells of level 0 that are passed on, the four components of their rotations.
+// Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
+// Turned  A group of cells of level 0 that are passed on stores their rotations instead.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
 //         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
 //         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.
@@ -15,7 +14,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -27,6 +25,20 @@
 #include "kernels/rotation.hpp"
 
 namespace kerf::cpu {
+
+/// Rotations of a group, [w x y z][lane], of the lanes that a pack has.
+template <class S>
+kernels::Quat<Pack<S>> load_quaternion(const S* q) {
+  return {load_pack(q), load_pack(q + kGroup), load_pack(q + 2 * kGroup),
+          load_pack(q + 3 * kGroup)};
+}
+template <class S>
+void store_quaternion(S* to, const kernels::Quat<Pack<S>>& q) {
+  store_pack(to, q.w);
+  store_pack(to + kGroup, q.x);
+  store_pack(to + 2 * kGroup, q.y);
+  store_pack(to + 3 * kGroup, q.z);
+}
 
 /// Integers as scalars.
 inline Pack<float> widened(const std::int16_t* from) {
@@ -171,22 +183,12 @@ class StoredMatrices {
   /// Of cells of level 0 that are passed on, rotations alone are stored.
   bool is_turned(std::size_t group) const { return (traits_[group] & kTurned) != 0; }
   void store(std::size_t group, int first, const kernels::Quat<P>& q) {
-    S* const to = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
-    store_pack(to, q.w);
-    store_pack(to + kGroup, q.x);
-    store_pack(to + 2 * kGroup, q.y);
-    store_pack(to + 3 * kGroup, q.z);
+    store_quaternion(plain_.data() + kGroup * std::size_t{begin_[group]} + first, q);
   }
   kernels::Quat<P> rotation(std::size_t group, int first) const {
     const S* const from = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
     prefetch(from, 4 * kGroup, 4 * kGroup);
-    return {load_pack(from), load_pack(from + kGroup), load_pack(from + 2 * kGroup),
-            load_pack(from + 3 * kGroup)};
-  }
-
-  std::array<S, 4> rotation_of(std::size_t lane) const {
-    const S* const q = plain_.data() + kGroup * std::size_t{begin_[lane / kGroup]} + lane % kGroup;
-    return {q[0], q[kGroup], q[2 * kGroup], q[3 * kGroup]};
+    return load_quaternion(from);
   }
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <iterator>
 #include <optional>
+#include <type_traits>
 
 #include "cpu/patch_sweep.hpp"
 
@@ -105,41 +106,34 @@ class TransferPoints {
       body(transfer_.lead_blocks[b], first, std::min(kGroup, part_.leads.end() - first));
   }
 
-  // Functions of their own where sweeps call them: see above.
-  [[gnu::noinline]] void take(const TransferBlock& block, const std::uint8_t* terms, int count) {
-    if (block.gaps) std::fill(std::begin(rows_), std::end(rows_), S(0));
+  /// body(rows as a type, run)
+  template <class Body>
+  void for_runs(const TransferBlock& block, const Body& body) const {
     const TransferRun* run = transfer_.runs.data() + block.first_run;
     for (int n = 0; n < block.runs; ++n, ++run) switch (run->rows) {
         case 1:
-          take_run<1>(*run);
+          body(std::integral_constant<int, 1>{}, *run);
           break;
         case 2:
-          take_run<2>(*run);
+          body(std::integral_constant<int, 2>{}, *run);
           break;
         case 4:
-          take_run<4>(*run);
+          body(std::integral_constant<int, 4>{}, *run);
           break;
         default:
-          take_run<TransferRun::kIdentity>(*run);
+          body(std::integral_constant<int, TransferRun::kIdentity>{}, *run);
       }
+  }
+
+  // Functions of their own where sweeps call them: see above.
+  [[gnu::noinline]] void take(const TransferBlock& block, const std::uint8_t* terms, int count) {
+    if (block.gaps) std::fill(std::begin(rows_), std::end(rows_), S(0));
+    for_runs(block, [&](auto rows, const TransferRun& run) { take_run<rows()>(run); });
     if (block.others) take_others(block, terms, count);
   }
   [[gnu::noinline]] void give(const TransferBlock& block, const std::uint8_t* terms, int count,
                               S* to) const {
-    const TransferRun* run = transfer_.runs.data() + block.first_run;
-    for (int n = 0; n < block.runs; ++n, ++run) switch (run->rows) {
-        case 1:
-          give_run<1>(*run, to);
-          break;
-        case 2:
-          give_run<2>(*run, to);
-          break;
-        case 4:
-          give_run<4>(*run, to);
-          break;
-        default:
-          give_run<TransferRun::kIdentity>(*run, to);
-      }
+    for_runs(block, [&](auto rows, const TransferRun& run) { give_run<rows()>(run, to); });
     if (block.others) give_others(block, terms, count, to);
   }
 
