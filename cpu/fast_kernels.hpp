@@ -18,6 +18,7 @@
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/modes.hpp"
 #include "kernels/rotation.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::cpu {
 
@@ -78,26 +79,28 @@ inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
                                                   kernels::Vec3<Pack<S>> (&out)[8]) {
-  for (int i = 0; i < 8; i += 2) {
+  kernels::unrolled<4>([&](auto edge) {
+    constexpr int i = 2 * edge;
     if constexpr (kKind == kScattered) {
       gather_points(x, points + kGroup * i, out[i]);
       gather_points(x, points + kGroup * (i + 1), out[i + 1]);
     } else {
       gather_runs<kRunInPack<kKind, S>>(x, points + kGroup * i, out[i], out[i + 1]);
     }
-  }
+  });
 }
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void add_corners(const std::uint16_t* points,
                                                const kernels::Vec3<Pack<S>> (&f)[8], S* y) {
-  for (int i = 0; i < 8; i += 2) {
+  kernels::unrolled<4>([&](auto edge) {
+    constexpr int i = 2 * edge;
     if constexpr (kKind == kScattered) {
       add_to_points(y, points + kGroup * i, f[i]);
       add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
     } else {
       add_runs<kRunInPack<kKind, S>>(y, points + kGroup * i, f[i], f[i + 1]);
     }
-  }
+  });
 }
 
 /// Calls body(points of the corners, how they lie, first lane) for each pack of a group.
@@ -194,7 +197,7 @@ KERF_FLATTEN void rotate_two(const kernels::Mat3<Pack<S>>* F, const kernels::Qua
   const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
   PackMask<S> proven[kPacks], lost[kPacks];
   for (int n = 0; n < kPacks; ++n) {
-    q[n] = kernels::normalised(start[n]);
+    q[n] = start[n];
     proven[n] = lost[n] = {P(S(1)).v < P(S(0)).v};
   }
   for (int i = 0; i < kIterations; ++i) {
@@ -211,6 +214,7 @@ KERF_FLATTEN void rotate_two(const kernels::Mat3<Pack<S>>* F, const kernels::Qua
     if (done) break;
   }
   for (int n = 0; n < kPacks; ++n) {
+    q[n] = kernels::normalised(q[n]);
     const PackMask<S> done = proven[n] && !lost[n];
     for (int k = 0; k < P::kLanes && !all(done); ++k) {
       if (done.v[k] != 0) continue;

@@ -33,6 +33,9 @@ std::uint64_t place_key(const Vec3i& p) {
   return at(2) << 42 | at(1) << 21 | at(0);
 }
 
+/// The same for all points of a row along x.
+std::uint64_t row_key(std::uint64_t place) { return place >> 21; }
+
 /// The points that a hanging corner is the mean of.
 std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int corner) {
   std::array<std::uint16_t, 4> out{};
@@ -259,23 +262,31 @@ Corners Numbering::corners_of(Draft& draft, std::int32_t cell, const Corners& sl
 }
 
 /// New points from the order in which they were met to that of their places; hanging ones come last
-/// of those of one place.
+/// of those of one place. Long rows start where a line of memory does, so that four points that are
+/// read or written together lie in one.
 void Numbering::sort(Draft& draft) {
-  const std::size_t vertices = draft.vertices.size();
-  order_.resize(places_.size());
-  for (std::size_t k = 0; k < places_.size(); ++k) {
+  const std::size_t vertices = draft.vertices.size(), count = places_.size();
+  order_.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
     const std::int32_t v = k < vertices ? draft.vertices[k] : INT32_MAX;
     order_[k] = {places_[k], static_cast<std::uint64_t>(v) << 16 | k};
   }
   std::sort(order_.begin(), order_.end());
-  rank_.resize(places_.size());
+  rank_.resize(count);
   std::vector<std::int32_t> sorted;
   sorted.reserve(vertices);
   draft.vertex_point.reserve(vertices);
   draft.hanging_point.resize(draft.masters.size());
-  for (std::size_t n = 0; n < order_.size(); ++n) {
+  constexpr std::int32_t kLine = 4, kLongRow = kGroup + 1;
+  const bool aligned = draft.anew && count < kMostPoints - kMostPoints / kLongRow * kLine;
+  std::int32_t next = draft.first_point;
+  for (std::size_t n = 0, end = 0; n < count; ++n, ++next) {
+    if (n == end) {  // a row begins
+      while (end < count && row_key(order_[end].first) == row_key(order_[n].first)) ++end;
+      if (aligned && end - n >= kLongRow) next = (next + kLine - 1) / kLine * kLine;
+    }
     const std::size_t k = order_[n].second & 0xFFFF;
-    rank_[k] = static_cast<std::uint16_t>(static_cast<std::size_t>(draft.first_point) + n);
+    rank_[k] = static_cast<std::uint16_t>(next);
     if (k < vertices) {
       sorted.push_back(draft.vertices[k]);
       draft.vertex_point.push_back(rank_[k]);
@@ -284,7 +295,7 @@ void Numbering::sort(Draft& draft) {
     }
   }
   draft.vertices = std::move(sorted);
-  draft.new_points = size_of(places_.size());
+  draft.new_points = next - draft.first_point;
   for (auto& masters : draft.masters)
     for (std::uint16_t& m : masters)
       if (m >= draft.first_point) m = rank_[m - draft.first_point];

@@ -11,7 +11,7 @@ namespace {
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
-/// A packed vertex of a draft that has no place yet.
+/// A packed vertex of a draft that has no place yet; and whose it is.
 std::int32_t claim(std::int32_t patch) { return -2 - patch; }
 
 }  // namespace
@@ -76,20 +76,27 @@ void PatchPlacer::share(std::int32_t v) {
   out_.fixed[to] = level_.fixed[v];
 }
 
-/// A vertex that a second patch has becomes a shared one, and stays so.
+/// A vertex that a second patch has becomes a shared one, and stays so. Those of the same two patches
+/// get numbers one after the other, so that what these have of them is read in order.
 void PatchPlacer::find_shared() {
-  for (const Draft& draft : *drafts_)
-    for (std::size_t n = 0; n < draft.vertices.size(); ++n) {
-      const std::int32_t v = draft.vertices[n], packed = out_.packed[v];
+  std::vector<std::pair<std::int32_t, std::int32_t>> found;  // first patch, vertex
+  for (const Draft& draft : *drafts_) {
+    found.clear();
+    for (const std::int32_t v : draft.vertices) {
+      const std::int32_t packed = out_.packed[v];
       if (packed == -1) {
         out_.packed[v] = claim(draft.patch);
       } else if (packed < 0) {
-        share(v);
+        found.emplace_back(claim(packed), v);
       } else if (const std::int32_t home = out_.home[packed / kGroup];
                  home >= 0 && home != draft.patch) {
-        share(v);
+        found.emplace_back(home, v);
       }
     }
+    std::stable_sort(found.begin(), found.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [patch, v] : found) share(v);
+  }
 }
 
 /// New own vertices, in the places that others left where there are such.

@@ -163,15 +163,19 @@ void PatchWriter::fold_group(std::int32_t group) {
 void PatchWriter::add_points() {
   if (draft_.anew)
     std::fill_n(out_.own_point.begin() + patch_.own.first, patch_.own.size, kNothing);
-  std::int32_t k = patch_.copies.first + draft_.before.copies.size;
+  std::vector<std::pair<std::int32_t, std::uint16_t>> copies;  // packed vertex, point
   for (std::size_t n = 0; n < draft_.vertices.size(); ++n) {
     const std::int32_t packed = out_.packed[draft_.vertices[n]];
-    if (out_.home[packed / kGroup] == draft_.patch) {
+    if (out_.home[packed / kGroup] == draft_.patch)
       out_.own_point[packed] = draft_.vertex_point[n];
-    } else {
-      out_.copy_point[k] = draft_.vertex_point[n];
-      out_.copy_vertex[k++] = packed;
-    }
+    else
+      copies.emplace_back(packed, draft_.vertex_point[n]);
+  }
+  std::sort(copies.begin(), copies.end());  // as they are numbered
+  std::int32_t k = patch_.copies.first + draft_.before.copies.size;
+  for (const auto& [packed, point] : copies) {
+    out_.copy_point[k] = point;
+    out_.copy_vertex[k++] = packed;
   }
   const std::ptrdiff_t hanging = patch_.hanging.first + draft_.before.hanging.size;
   std::copy(draft_.hanging_point.begin(), draft_.hanging_point.end(),

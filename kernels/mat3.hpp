@@ -6,6 +6,7 @@
 #pragma once
 
 #include "kernels/fma.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::kernels {
 
@@ -74,13 +75,11 @@ struct Mat3 {
     return {{{T(1), T(0), T(0)}, {T(0), T(1), T(0)}, {T(0), T(0), T(1)}}};
   }
   KERF_HD Mat3& operator+=(const Mat3& b) {
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) m[i][j] += b.m[i][j];
+    unrolled<9>([&](auto at) { m[at / 3][at % 3] += b.m[at / 3][at % 3]; });
     return *this;
   }
   KERF_HD Mat3& operator*=(T s) {
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) m[i][j] *= s;
+    unrolled<9>([&](auto at) { m[at / 3][at % 3] *= s; });
     return *this;
   }
   friend KERF_HD Mat3 operator+(Mat3 a, const Mat3& b) { return a += b; }
@@ -109,11 +108,12 @@ KERF_HD Vec3<T> transpose_times(const Mat3<T>& a, const Vec3<T>& v) {
 
 template <class T>
 KERF_HD Mat3<T> operator*(const Mat3<T>& a, const Mat3<T>& b) {
-  Mat3<T> c;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      c[i][j] = fma(a[i][0], b[0][j], fma(a[i][1], b[1][j], a[i][2] * b[2][j]));
-  return c;
+  const auto at = [&](int i, int j) {
+    return fma(a[i][0], b[0][j], fma(a[i][1], b[1][j], a[i][2] * b[2][j]));
+  };
+  return {{{at(0, 0), at(0, 1), at(0, 2)},
+           {at(1, 0), at(1, 1), at(1, 2)},
+           {at(2, 0), at(2, 1), at(2, 2)}}};
 }
 
 template <class T>
@@ -296,6 +296,16 @@ KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
   return {{{one - (yy + zz), xy - wz, xz + wy},
            {xy + wz, one - (xx + zz), yz - wx},
            {xz - wy, yz + wx, one - (xx + yy)}}};
+}
+
+/// |q|^2 times the rotation of q.
+template <class T>
+KERF_HD Mat3<T> to_scaled_matrix(const Quat<T>& q) {
+  const Mat3<T> D = to_matrix_less_identity(q);  // times |q|^2
+  const T square = fma(q.w, q.w, q.x * q.x) + fma(q.y, q.y, q.z * q.z);
+  return {{{square + D[0][0], D[0][1], D[0][2]},
+           {D[1][0], square + D[1][1], D[1][2]},
+           {D[2][0], D[2][1], square + D[2][2]}}};
 }
 
 }  // namespace kerf::kernels

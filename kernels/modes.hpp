@@ -74,22 +74,24 @@ KERF_HD constexpr int mode_axes(int mode) {
 /// One axis of H, of the v[i] with i without the bits `skipped`.
 template <int bit, int skipped, class T>
 KERF_HD void walsh_axis(T (&v)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) {
-    if ((i & (bit | skipped)) != 0) continue;
-    const T low = v[i], high = v[i + bit];
-    v[i] = high + low;
-    v[i + bit] = high - low;
-  }
+  unrolled<kCorners>([&](auto i) {
+    if constexpr ((i & (bit | skipped)) == 0) {
+      const T low = v[i], high = v[i + bit];
+      v[i] = high + low;
+      v[i + bit] = high - low;
+    }
+  });
 }
 /// One axis of H^T.
 template <int bit, class T>
 KERF_HD void corner_axis(T (&v)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) {
-    if ((i & bit) != 0) continue;
-    const T even = v[i], odd = v[i + bit];
-    v[i] = even - odd;
-    v[i + bit] = even + odd;
-  }
+  unrolled<kCorners>([&](auto i) {
+    if constexpr ((i & bit) == 0) {
+      const T even = v[i], odd = v[i + bit];
+      v[i] = even - odd;
+      v[i + bit] = even + odd;
+    }
+  });
 }
 
 /// H: corners to modes, of one component, in place. 24 additions.
@@ -111,21 +113,21 @@ KERF_HD void to_corners(T (&v)[kCorners]) {
 /// registers, and 24 do not.
 template <class T>
 KERF_HD void to_modes(const Vec3<T> (&v)[kCorners], T (&m)[3][kCorners]) {
-  for (int i = 0; i < kCorners; ++i) m[0][i] = v[i].x;
+  unrolled<kCorners>([&](auto i) { m[0][i] = v[i].x; });
   to_modes(m[0]);
-  for (int i = 0; i < kCorners; ++i) m[1][i] = v[i].y;
+  unrolled<kCorners>([&](auto i) { m[1][i] = v[i].y; });
   to_modes(m[1]);
-  for (int i = 0; i < kCorners; ++i) m[2][i] = v[i].z;
+  unrolled<kCorners>([&](auto i) { m[2][i] = v[i].z; });
   to_modes(m[2]);
 }
 template <class T>
 KERF_HD void to_corners(T (&m)[3][kCorners], Vec3<T> (&v)[kCorners]) {
   to_corners(m[0]);
-  for (int i = 0; i < kCorners; ++i) v[i].x = m[0][i];
+  unrolled<kCorners>([&](auto i) { v[i].x = m[0][i]; });
   to_corners(m[1]);
-  for (int i = 0; i < kCorners; ++i) v[i].y = m[1][i];
+  unrolled<kCorners>([&](auto i) { v[i].y = m[1][i]; });
   to_corners(m[2]);
-  for (int i = 0; i < kCorners; ++i) v[i].z = m[2][i];
+  unrolled<kCorners>([&](auto i) { v[i].z = m[2][i]; });
 }
 
 /// Three modes in the frame of a cell: l[n] = R^T m. By rows of R, so that only l and a row need
@@ -200,7 +202,7 @@ KERF_HD void apply_modes(const Mat3<T>& R, T stiffness, const ModeStiffness<T>& 
   const ModeStiffness<T> k{stiffness * unit.a, stiffness * unit.b, stiffness * unit.c,
                            stiffness * unit.d, stiffness * unit.e, stiffness * unit.f,
                            stiffness * unit.g};
-  for (int i = 0; i < 3; ++i) m[i][0] = with_inertia ? inertia[0] * m[i][0] : T(0);
+  unrolled<3>([&](auto i) { m[i][0] = with_inertia ? inertia[0] * m[i][0] : T(0); });
   T linear[3][3];
   modes_into_frame<1, 2, 4>(R, m, linear);
   add_rest(linear);
@@ -212,7 +214,7 @@ KERF_HD void apply_modes(const Mat3<T>& R, T stiffness, const ModeStiffness<T>& 
   modes_from_frame<3, 5, 6, with_inertia>(R, bilinear, inertia[2], m);
   // Mode xyz is a multiple of its own, and R R^T = 1.
   const T all = with_inertia ? k.f + inertia[3] : k.f;
-  for (int i = 0; i < 3; ++i) m[i][7] *= all;
+  unrolled<3>([&](auto i) { m[i][7] *= all; });
 }
 
 /// f = stiffness [R] K [R]^T u for one finest cell without inertia; f may be u. 300 slots.
@@ -259,8 +261,9 @@ KERF_HD void elastic_force(const Vec3<T> (&u)[kCorners], const Quat<T>& rotation
   const T rest = T(4) * side;
   const T inertia[4] = {T(0), T(0), T(0), T(0)};
   const auto add_rest = [&](T(&l)[3][3]) {
-    for (int n = 0; n < 3; ++n)
-      for (int i = 0; i < 3; ++i) l[n][i] = fma(rest, D[n][i], l[n][i]);
+    unrolled<3>([&](auto n) {
+      unrolled<3>([&](auto i) { l[n][i] = fma(rest, D[n][i], l[n][i]); });
+    });
   };
   apply_modes<false>(R, stiffness, k, inertia, add_rest, m);
   to_corners(m, f);

@@ -33,30 +33,31 @@ KERF_HD Mat3<T> mean_gradient(const Vec3<T> (&u)[kCorners], T side) {
                            ((u[2] - u[0]) + (u[3] - u[1])) + ((u[6] - u[4]) + (u[7] - u[5])),
                            ((u[4] - u[0]) + (u[5] - u[1])) + ((u[6] - u[2]) + (u[7] - u[3]))};
   const T scale = T(1) / (T(4) * side);
-  Mat3<T> F = Mat3<T>::identity();
-  for (int a = 0; a < 3; ++a)
-    for (int c = 0; c < 3; ++c) F[c][a] += scale * mode[a][c];
-  return F;
+  const auto less_identity = [&](int c, int a) { return scale * mode[a][c]; };
+  return {{{T(1) + less_identity(0, 0), less_identity(0, 1), less_identity(0, 2)},
+           {less_identity(1, 0), T(1) + less_identity(1, 1), less_identity(1, 2)},
+           {less_identity(2, 0), less_identity(2, 1), T(1) + less_identity(2, 2)}}};
 }
 
 template <class T>
 struct RotationStep {
-  Quat<T> next;
+  Quat<T> next;                  // not of length 1
   T length2;                     // of the rotation vector, radians squared
   decltype(T(0) < T(0)) ascent;  // tr(S) I - S was safely positive definite
 };
 
 /// One Newton step for the maximum of tr(R^T F): omega = (tr(S) I - S)^-1 axial(R^T F), applied as
-/// the Cayley quaternion (1, omega / 2). Where that matrix is not safely positive definite, q
-/// stays.
+/// the Cayley quaternion (1, omega / 2). Where that matrix is not safely positive definite, the next
+/// q means nothing. A step from a longer q is the same, so several need no square root but that of
+/// normalised() behind the last: the next q is sqrt(1 + omega^2 / 4) times as long.
 ///
-/// Needs  |q| = 1; F neither so large nor so small that its cube over- or underflows.
+/// Needs  |q|^2 F neither so large nor so small that its cube over- or underflows.
 template <class T>
 KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& out) {
   // det > 1e-3 tr^3 keeps the smallest eigenvalue above 0.4 % of the trace; at rest the ratio is
   // 0.037, the greatest there is.
   const T kSafe = T(1e-3);
-  const Mat3<T> A = transpose(to_matrix(q)) * F;
+  const Mat3<T> A = transpose(to_scaled_matrix(q)) * F;
   const Vec3<T> axial{A[2][1] - A[1][2], A[0][2] - A[2][0], A[1][0] - A[0][1]};
   const T hxx = A[1][1] + A[2][2], hyy = A[0][0] + A[2][2], hzz = A[0][0] + A[1][1];
   const T hxy = T(-0.5) * (A[0][1] + A[1][0]);
@@ -74,7 +75,7 @@ KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& 
   const Vec3<T> w{half * (cxx * axial.x + cxy * axial.y + cxz * axial.z),
                   half * (cxy * axial.x + cyy * axial.y + cyz * axial.z),
                   half * (cxz * axial.x + cyz * axial.y + czz * axial.z)};
-  out.next = normalised(q * Quat<T>{T(1), w.x, w.y, w.z});
+  out.next = q * Quat<T>{T(1), w.x, w.y, w.z};
   out.length2 = T(4) * dot(w, w);
   out.ascent = ascent;
 }
@@ -91,7 +92,7 @@ KERF_HD Quat<T> rotation_newton(const Mat3<T>& F, Quat<T> start, int iterations)
     rotation_step(F, start, step);
     start = step.next;
   }
-  return start;
+  return normalised(start);
 }
 
 /// Horn's matrix N with tr(R(q)^T F) = q^T N q for a unit quaternion q = (w, x, y, z).
@@ -208,7 +209,7 @@ KERF_HD Quat<T> extract_rotation(const Mat3<T>& F, const Quat<T>& start) {
     rotation_step(scaled, q, step);
     if (!step.ascent) break;
     q = step.next;
-    if (step.length2 <= kSmall2) return q;
+    if (step.length2 <= kSmall2) return normalised(q);
   }
   return rotation_horn(scaled, first);
 }

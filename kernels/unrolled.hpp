@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
 // Loops whose counter is a constant: what they index stays in registers, and indices into a packed
-// triangle are none at run time.
+// triangle are none at run time. GCC 12 unrolls short loops by itself, but those in loops so late
+// that arrays of packs have been given memory, to which it then writes every entry.
 #pragma once
 
 #include "kernels/host_device.hpp"
@@ -11,6 +12,7 @@ namespace kerf::kernels {
 template <int n>
 struct Constant {
   static constexpr int value = n;
+  KERF_HD constexpr operator int() const { return n; }  // NOLINT: counters and numbers are one thing
 };
 template <int... n>
 struct Counters {};

@@ -80,6 +80,43 @@ TEST(Patches, HaveRunsOfAllKinds) {
   EXPECT_TRUE(own.contains({cpu::TransferRun::kIdentity, 0}));
 }
 
+TEST(Patches, HaveLongRowsOfPointsAtLinesOfMemory) {
+  ProblemOptions options;
+  options.max_levels = 1;
+  options.materials = 1;
+  options.with_oracle = false;
+  const Problem p({LinkedOctree(test::box_body({64, 48, 40}), 0), options});
+  const PatchedLevel l = std::move(patches_of(p.hierarchy, 1)[0]);
+  int rows = 0, at_lines = 0;
+  test::for_groups(l, [&](std::int32_t, std::size_t g) {
+    if (l.row[g] != cpu::kRow) return;
+    ++rows;
+    const std::uint16_t* const points = l.corners.data() + 8 * kGroup * g;
+    at_lines += points[0] % 4 == 0 && points[2 * kGroup] % 4 == 0 && points[4 * kGroup] % 4 == 0 &&
+                points[6 * kGroup] % 4 == 0;
+  });
+  EXPECT_GT(rows, 5000);
+  EXPECT_GT(10 * at_lines, 9 * rows) << at_lines << " of " << rows;  // some patches have a step
+}
+
+// What two patches share is read in order by both.
+TEST(Patches, HaveTheirCopiesInOrder) {
+  const Problem p = cut_octree(true);
+  int pairs = 0, jumps = 0;
+  for (const PatchedLevel& l : patches_of(p.hierarchy, 1)) {
+    for (const cpu::Patch& patch : l.patches)
+      for (std::int32_t k = patch.copies.first + 1; k < patch.copies.end(); ++k) {
+        const std::int32_t before = l.shared_number(l.copy_vertex[k - 1]),
+                           here = l.shared_number(l.copy_vertex[k]);
+        EXPECT_LT(before, here);
+        ++pairs;
+        jumps += here > before + 1;
+      }
+  }
+  EXPECT_GT(pairs, 1000);
+  EXPECT_LT(4 * jumps, pairs);
+}
+
 // The first patch of a body of 64^3 cells would have 8192, each with eight points of its own here.
 TEST(Patches, OfLooseCellsHaveNumbersForAllPoints) {
   LinkedOctree body(test::box_body({64, 64, 64}), 0);
