@@ -306,8 +306,7 @@ void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack
                                      Pack<S> (&out)[kEntries]) const {
   const FastLevel<S>& l = levels_[level];
   l.matrices.gather(lanes, out);
-  if (level == 1)
-    add_turned(levels_[0].patched, values_of<S>(), scale_, l.patched, l.matrices, lanes, out);
+  if (level == 1) add_turned(turned_cells(), values_of<S>().materials, scale_, lanes, out);
 }
 
 // Some children of the coarse cells in the lanes, one each. Held components are those of slots, so
@@ -362,8 +361,42 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   if (!children.any_plain()) return;
   P some[kEntries];
   std::fill(std::begin(some), std::end(some), P(0));
-  merge_finest(from, values_of<S>(), scale_, children.plain(), some);
+  merge_elements(FinestCells<S>{from, values_of<S>()}, values_of<S>().materials, scale_,
+                 children.plain(), some);
   for (int e = 0; e < kEntries; ++e) out[e] += some[e];
+}
+
+// Rotations of the cells of level 1 that are one element each, or may be. Eight cells of one
+// rotation are exactly an element of twice the side. In single precision, where matrices only
+// precondition, nearly one rotation is enough.
+template <class S>
+void FastBackend<S>::turn() {
+  constexpr double kNear = 0.1;  // radians
+  FastLevel<S>& to = levels_[1];
+  const PatchedLevel& packed = to.patched;
+  // The mass of lumped cells is not that of a lumped one.
+  const bool may_be_one =
+      !kIsDouble && levels_.size() > 2 && (scale_.mass == 0 || !hierarchy_->lumped_mass);
+  const auto groups = static_cast<std::int32_t>(packed.groups());
+#pragma omp parallel for num_threads(threads_) schedule(static) if (groups >= kWorthGroups)
+  for (std::int32_t g = 0; g < groups; ++g) {
+    const auto group = static_cast<std::size_t>(g);
+    if (!is_of_finest(packed.kind[group])) continue;
+    const bool eight = is_of_eight(packed.kind[group]);
+    bool is_one = !eight || may_be_one;
+    if (is_one)
+      for_packs<S>([&](int first) {
+        const std::int32_t* const children = packed.children.data() + 8 * kGroup * group + first;
+        kernels::FinestChild<Pack<S>> child;
+        if (!eight)
+          load_elements(FinestCells<S>{levels_[0].patched, values_of<S>()}, scale_, children,
+                        kAnyMaterial, child);
+        else if (!mean_rotation(values_of<S>(), children, kNear, child.rotation))
+          is_one = false;
+        to.matrices.store(group, first, child.rotation);
+      });
+    if (!is_one) to.matrices.do_not_turn(group);
+  }
 }
 
 template <class S>
@@ -373,22 +406,20 @@ void FastBackend<S>::coarsen(int fine) {
   FastLevel<S>& to = levels_[fine + 1];
   const PatchedLevel& packed = to.patched;
   const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
-  to.matrices.allocate(packed, fine == 0 && !coarsest, scale_.mass != 0);
+  to.matrices.start(packed, fine == 0 && !coarsest, scale_.mass != 0);
+  if (fine == 0) turn();
+  to.matrices.allocate();
   const auto groups = static_cast<std::int32_t>(packed.groups());
+  const std::vector<PackedMaterial<S>>& materials = values_of<S>().materials;
   // General cells cost many times as much as others, and lie together.
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     const std::uint16_t kind = packed.kind[group];
-    if (kind == kNoCells || kind == kIdle) continue;
+    if (kind == kNoCells || kind == kIdle || to.matrices.is_turned(group)) continue;
     const bool passed = kind == kPassed || kind == kHeldPassed;
     for_packs<S>([&](int first) {
       const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
-      if (is_of_finest(kind)) {
-        kernels::FinestChild<P> child;
-        load_elements(from.patched, values_of<S>(), scale_, children, kAnyMaterial, child);
-        return to.matrices.store(group, first, child.rotation);
-      }
       const auto cells = packed.cell.begin() + kGroup * g + first;
       P out[kEntries];
       if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {
@@ -398,7 +429,10 @@ void FastBackend<S>::coarsen(int fine) {
       if (kind == kGeneral || kind == kGeneralPassed)
         merge_general(fine, group, first, out);
       else if (fine == 0)
-        merge_finest(from.patched, values_of<S>(), scale_, children, out);
+        merge_elements(FinestCells<S>{from.patched, values_of<S>()}, materials, scale_, children,
+                       out);
+      else if (fine == 1 && !passed && turned_cells().are_all(children, 8))
+        merge_elements(turned_cells(), materials, scale_, children, out);
       else
         merge_stored<S>(
             [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
@@ -457,7 +491,7 @@ void FastBackend<S>::prepare(int level) {
         add_stored_diagonals(packed, l.matrices, folds_, group, to);
         continue;
       }
-      const CellKind& kind = finest_kind(level, group);
+      const CellKind kind = element_kind(level, group);
       add_element_diagonals(
           packed, kind, values_of<S>().materials[kind.material].modes, scale_, folds_, group,
           [&](int first) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "cpu/element_cells.hpp"
 #include "cpu/fast_kernels.hpp"
 #include "cpu/general_children.hpp"
 #include "kernels/coarsen.hpp"
@@ -19,32 +20,6 @@ namespace kerf::cpu {
 struct Weights {
   float w[8][8];
 };
-
-constexpr int kAnyMaterial = -1;
-
-/// Elements of some lanes of level 0 (-1: none) that are of `material`; others have no stiffness.
-template <class S>
-void load_elements(const PatchedLevel& level, const FinestValues<S>& values,
-                   const OperatorScale& scale, const std::int32_t* lanes, int material,
-                   kernels::FinestChild<Pack<S>>& out) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes], mass[kLanes];
-  for (int k = 0; k < kLanes; ++k) {
-    q[0][k] = 1;
-    q[1][k] = q[2][k] = q[3][k] = stiffness[k] = mass[k] = 0;
-    if (lanes[k] < 0) continue;
-    const auto lane = static_cast<std::size_t>(lanes[k]);
-    const CellKind& kind = level.kinds[level.kind[lane / kGroup]];
-    if (material != kAnyMaterial && kind.material != material) continue;
-    const S* from = values.rotation.data() + values.place(lane);
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
-    stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
-    mass[k] = static_cast<S>(scale.mass * kind.mass);
-  }
-  out.rotation = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
-  out.stiffness = load_pack(stiffness);
-  out.mass = load_pack(mass);
-}
 
 /// Some cells of level 0, one in each lane: -1 is none.
 template <class S>
@@ -68,7 +43,7 @@ struct FinestLanes {
       any_held = any_held || level.held[cell[k]] != kFree;
       material = material == kAnyMaterial || material == its ? its : kMixed;
     }
-    load_elements(level, values, scale, lanes, kAnyMaterial, element);
+    load_elements(FinestCells<S>{level, values}, scale, lanes, kAnyMaterial, element);
   }
 };
 
@@ -225,34 +200,22 @@ inline Weights child_weights(const Level& level, std::int32_t child, bool slots)
   return out;
 }
 
-/// Which materials the children in some lanes of a group are of, as bits.
-template <class S>
-std::uint64_t materials_of(const PatchedLevel& level, const std::int32_t* children, int octants) {
-  std::uint64_t out = 0;
-  for (int octant = 0; octant < octants; ++octant)
-    for (int k = 0; k < Pack<S>::kLanes; ++k)
-      if (const std::int32_t lane = children[kGroup * octant + k]; lane >= 0)
-        out |= std::uint64_t{1} << (level.kinds[level.kind[lane / kGroup]].material % 64);
-  return out;
-}
-
-/// Matrices by modes of parents whose children are of level 0, none of them partly held.
-template <class S>
-void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
-                  const OperatorScale& scale, const std::int32_t* children,
-                  Pack<S> (&out)[kEntries]) {
+/// Matrices by modes of parents whose children are one element each, none of them partly held.
+template <class Cells, class S>
+void merge_elements(const Cells& cells, const std::vector<PackedMaterial<S>>& materials,
+                    const OperatorScale& scale, const std::int32_t* children,
+                    Pack<S> (&out)[kEntries]) {
   using P = Pack<S>;
-  const std::uint64_t materials = materials_of<S>(level, children, 8);
-  if (materials == 0)  // all children are wholly held
+  const std::uint64_t present = materials_of<S>(cells, children, 8);
+  if (present == 0)  // all children are wholly held
     for (P& entry : out) entry = P(0);
   bool first = true;
-  for (std::size_t m = 0; m < values.materials.size(); ++m) {
-    if (((materials >> (m % 64)) & 1) == 0) continue;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    if (((present >> (m % 64)) & 1) == 0) continue;
     kernels::FinestChild<P> child[8];
     for (int octant = 0; octant < 8; ++octant)
-      load_elements(level, values, scale, children + kGroup * octant, static_cast<int>(m),
-                    child[octant]);
-    const kernels::ModeConstants<P>& constants = values.materials[m].modes;
+      load_elements(cells, scale, children + kGroup * octant, static_cast<int>(m), child[octant]);
+    const kernels::ModeConstants<P>& constants = materials[m].modes;
     P some[kEntries];
     P* to = first ? out : some;
     if (scale.mass == 0)
@@ -267,28 +230,25 @@ void merge_finest(const PatchedLevel& level, const FinestValues<S>& values,
 }
 
 /// Adds the matrices of cells in some lanes (-1: none) of level 1 of which only rotations are
-/// stored, from the cells of level 0 that they are.
+/// stored.
 template <class S>
-void add_turned(const PatchedLevel& finest, const FinestValues<S>& values,
-                const OperatorScale& scale, const PatchedLevel& level,
-                const StoredMatrices<S>& matrices, const std::int32_t (&lanes)[Pack<S>::kLanes],
+void add_turned(const TurnedCells<S>& cells, const std::vector<PackedMaterial<S>>& materials,
+                const OperatorScale& scale, const std::int32_t (&lanes)[Pack<S>::kLanes],
                 Pack<S> (&sum)[kEntries]) {
-  std::int32_t children[Pack<S>::kLanes];
-  for (int k = 0; k < Pack<S>::kLanes; ++k) {
-    children[k] = -1;
-    if (lanes[k] < 0) continue;
-    const auto group = static_cast<std::size_t>(lanes[k] / kGroup);
-    if (matrices.is_turned(group))
-      children[k] = level.children[8 * kGroup * group + lanes[k] % kGroup];
-  }
-  const std::uint64_t materials = materials_of<S>(finest, children, 1);
-  for (std::size_t m = 0; m < values.materials.size() && materials != 0; ++m) {
-    if (((materials >> (m % 64)) & 1) == 0) continue;
+  std::int32_t turned[Pack<S>::kLanes];
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    turned[k] =
+        lanes[k] >= 0 && cells.matrices.is_turned(static_cast<std::size_t>(lanes[k] / kGroup))
+            ? lanes[k]
+            : -1;
+  const std::uint64_t present = materials_of<S>(cells, turned, 1);
+  for (std::size_t m = 0; m < materials.size() && present != 0; ++m) {
+    if (((present >> (m % 64)) & 1) == 0) continue;
     kernels::FinestChild<Pack<S>> child;
-    load_elements(finest, values, scale, children, static_cast<int>(m), child);
+    load_elements(cells, scale, turned, static_cast<int>(m), child);
     Pack<S> some[kEntries];
     kernels::finest_mode_matrix(kernels::to_matrix(child.rotation), child.stiffness, child.mass,
-                                values.materials[m].modes, static_cast<Pack<S>*>(some));
+                                materials[m].modes, static_cast<Pack<S>*>(some));
     for (int e = 0; e < kEntries; ++e) sum[e] += some[e];
   }
 }

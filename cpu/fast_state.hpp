@@ -15,6 +15,7 @@
 
 #include "core/backend.hpp"
 #include "core/base/error.hpp"
+#include "cpu/element_cells.hpp"
 #include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
 #include "cpu/front_factor.hpp"
@@ -256,11 +257,16 @@ class FastBackend final : public Backend {
   void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
                      Pack<double> (&full)[24][24]) const;
   void assemble_coarsest(bool definite);
-  /// What the cells of a group are, of level 0 or passed on from there.
-  const CellKind& finest_kind(int level, std::size_t group) const {
-    const int kind = levels_[level].patched.kind[group];
-    return levels_[0].patched.kinds[level == 0 ? kind : kind - kOfFinest];
+  /// What the cells of a group are that are one element each.
+  CellKind element_kind(int level, std::size_t group) const {
+    const std::uint16_t kind = levels_[level].patched.kind[group];
+    const std::vector<CellKind>& kinds = levels_[0].patched.kinds;
+    return level == 0 ? kinds[kind] : cpu::element_kind(kinds, kind);
   }
+  TurnedCells<S> turned_cells() const {
+    return {levels_[0].patched, levels_[1].patched, levels_[1].matrices};
+  }
+  void turn();
   void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
   void add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
@@ -378,7 +384,7 @@ void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y
     finest_products(l.patched, values_of<T>(), scale_, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
     if (!l.matrices.is_turned(group)) return stored_products(l.patched, l.matrices, group, x, y);
-    const CellKind& kind = finest_kind(level, group);
+    const CellKind kind = element_kind(level, group);
     element_products(
         l.patched, kind, values_of<S>().materials[kind.material], scale_, group,
         [&](int first) { return l.matrices.rotation(group, first); }, x, y);

@@ -146,8 +146,8 @@ class Patcher {
       last_kind_ =
           static_cast<std::size_t>(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
     if (last_kind_ == kinds.size()) kinds.push_back(kind);
-    static_assert(kNoCells - kOfFinest == 65519);
-    expects(last_kind_ < 65519, "the body has more than 65519 kinds of cells");
+    expects(last_kind_ < kMostKinds,
+            text("the body has more than ", kMostKinds, " kinds of cells"));
     return static_cast<std::uint16_t>(last_kind_);
   }
 
@@ -166,9 +166,17 @@ class Patcher {
     const bool masks = held && finer_->children.empty();  // children of level 0
     if (masks || twice || is_loose(c)) return passed ? kGeneralPassed : kGeneral;
     if (held) return passed ? kHeldPassed : kHeldMerged;
-    if (passed && finer_->children.empty())
-      return static_cast<std::uint16_t>(kOfFinest +
-                                        finer_->kind[finer_->lane[children[0]] / kGroup]);
+    if (finer_->children.empty()) {
+      const auto kind = [&](std::int32_t child) {
+        return finer_->kind[finer_->lane[child] / kGroup];
+      };
+      const std::uint16_t first = kind(children[0]);
+      const bool alike = std::all_of(children.begin(), children.end(),
+                                     [&](std::int32_t child) { return kind(child) == first; });
+      if (passed) return kind_of_finest(first, false);
+      if (octants == 0xFF && alike && !kernels::has_hanging(level_.fold[c]))
+        return kind_of_finest(first, true);
+    }
     return passed ? kPassed : kMerged;
   }
 

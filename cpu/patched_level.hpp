@@ -55,10 +55,22 @@ enum StoredKind : std::uint16_t {
   kHeldPassed,       ///< from one cell above level 0
   kGeneral,          ///< from cells of level 0, or two children have one octant; or a loose cell
   kGeneralPassed,    ///< the same from one cell
-  kOfFinest = 16,    ///< and on: from one cell of level 0 of kind - kOfFinest, which is not stored
+  kOfFinest = 16,    ///< and on, in twos: from one cell of level 0 of some kind, or from eight
   kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
 constexpr bool is_of_finest(std::uint16_t kind) { return kind >= kOfFinest && kind != kNoCells; }
+/// From eight cells of level 0 of one kind, one an octant; no corner hangs. Of one rotation they
+/// would be an element of twice the side.
+constexpr bool is_of_eight(std::uint16_t kind) { return is_of_finest(kind) && kind % 2 != 0; }
+/// The kind of the cells of level 0 that it is from.
+constexpr std::uint16_t finest_kind(std::uint16_t kind) {
+  return static_cast<std::uint16_t>((kind - kOfFinest) / 2);
+}
+constexpr std::uint16_t kind_of_finest(std::uint16_t finest, bool eight) {
+  return static_cast<std::uint16_t>(kOfFinest + 2 * finest + (eight ? 1 : 0));
+}
+inline constexpr std::size_t kMostKinds = (kNoCells - kOfFinest) / 2;  // of cells of level 0
+static_assert(kOfFinest % 2 == 0 && is_of_finest(kind_of_finest(kMostKinds - 1, true)));
 /// Whether cells of level 0 below are partly held, or matrices are made as if they were.
 constexpr bool is_held(std::uint16_t kind) { return kind >= kHeldMerged && kind < kOfFinest; }
 

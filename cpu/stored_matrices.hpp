@@ -4,7 +4,8 @@
 // cells of a group side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
-// Turned  A group of cells of level 0 that are passed on stores their rotations instead.
+// Turned  Where cells of level 1 are one element each, their rotations are stored instead: cells of
+//         level 0 that are passed on, and where the backend says so, eight of them as one.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
 //         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
 //         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.
@@ -159,43 +160,60 @@ class StoredMatrices {
  public:
   using P = Pack<S>;
 
-  /// Room for the groups of a level.
-  void allocate(const PatchedLevel& level, bool coded, bool with_mass) {
-    begin_.clear();
+  /// What the groups of a level are, with room for rotations; all groups that may be turned are.
+  void start(const PatchedLevel& level, bool coded, bool with_mass) {
     traits_.clear();
-    std::size_t plain = 0, codes = 0;
+    rotations_at_.clear();
+    std::uint32_t rotations = 0;
     for (std::size_t g = 0; g < level.groups(); ++g) {
       const bool held = is_held(level.kind[g]), turned = is_of_finest(level.kind[g]);
-      const bool is_coded = coded && std::is_same_v<S, float> && !held && !turned;
-      const bool full = with_mass || held;
       const bool none = level.kind[g] == kNoCells || level.kind[g] == kIdle;
-      traits_.push_back(static_cast<std::uint8_t>((full ? kFull : 0) | (is_coded ? kCoded : 0) |
-                                                  (none ? kNone : 0) | (turned ? kTurned : 0)));
-      std::size_t& size = is_coded ? codes : plain;
+      const bool is_coded = coded && std::is_same_v<S, float> && !held;
+      traits_.push_back(static_cast<std::uint8_t>((with_mass || held ? kFull : 0) |
+                                                  (is_coded ? kCoded : 0) | (none ? kNone : 0) |
+                                                  (turned ? kTurned : 0)));
+      rotations_at_.push_back(rotations);
+      rotations += turned ? 1 : 0;
+    }
+    rotations_.resize(4 * kGroup * std::size_t{rotations});
+  }
+  /// A group that is not to be turned.
+  void do_not_turn(std::size_t group) {
+    traits_[group] = static_cast<std::uint8_t>(traits_[group] & ~kTurned);
+  }
+  /// Room for the matrices of all other groups.
+  void allocate() {
+    begin_.clear();
+    std::size_t plain = 0, codes = 0;
+    for (std::size_t g = 0; g < traits_.size(); ++g) {
+      std::size_t& size = is_coded(g) ? codes : plain;
       begin_.push_back(static_cast<std::uint32_t>(size));
-      if (!none) size += turned ? 4 : full ? kernels::kEntries : kernels::kModeEntries;
+      if ((traits_[g] & (kNone | kTurned)) == 0) size += static_cast<std::size_t>(entries_of(g));
     }
     plain_.resize(kGroup * plain);
     codes_.resize(kGroup * codes);
-    unit_.resize(codes > 0 ? level.cell.size() : 0);
+    unit_.resize(codes > 0 ? kGroup * traits_.size() : 0);
   }
 
-  /// Of cells of level 0 that are passed on, rotations alone are stored.
   bool is_turned(std::size_t group) const { return (traits_[group] & kTurned) != 0; }
   void store(std::size_t group, int first, const kernels::Quat<P>& q) {
-    store_quaternion(plain_.data() + kGroup * std::size_t{begin_[group]} + first, q);
+    store_quaternion(rotations_.data() + rotations_of(group) + first, q);
   }
   kernels::Quat<P> rotation(std::size_t group, int first) const {
-    const S* const from = plain_.data() + kGroup * std::size_t{begin_[group]} + first;
-    prefetch(from, 4 * kGroup, 4 * kGroup);
-    return load_quaternion(from);
+    constexpr std::size_t kAhead = 4, kScalars = 4 * kGroup;
+    prefetch(rotations_.data(), rotations_of(group) + kScalars * kAhead, kScalars);
+    return load_quaternion(rotations_.data() + rotations_of(group) + first);
+  }
+  /// w of a cell in a group that is turned; the others follow in steps of a group.
+  const S* rotation_of(std::size_t lane) const {
+    return rotations_.data() + rotations_of(lane / kGroup) + lane % kGroup;
   }
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
   std::size_t bytes() const {
-    return begin_.capacity() * sizeof(begin_[0]) + traits_.capacity() +
-           plain_.capacity() * sizeof(S) + codes_.capacity() * sizeof(codes_[0]) +
-           unit_.capacity() * sizeof(S);
+    return (begin_.capacity() + rotations_at_.capacity()) * sizeof(begin_[0]) + traits_.capacity() +
+           (rotations_.capacity() + plain_.capacity()) * sizeof(S) +
+           codes_.capacity() * sizeof(codes_[0]) + unit_.capacity() * sizeof(S);
   }
 
   /// Of the lanes from `first` on.
@@ -256,6 +274,9 @@ class StoredMatrices {
  private:
   static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4, kTurned = 8;
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
+  std::size_t rotations_of(std::size_t group) const {
+    return 4 * kGroup * std::size_t{rotations_at_[group]};
+  }
   int entries_of(std::size_t group) const {
     return with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
   }
@@ -270,7 +291,7 @@ class StoredMatrices {
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
       const std::size_t group = static_cast<std::size_t>(lanes[k]) / kGroup;
-      if (!is_coded(group) || (traits_[group] & kNone) != 0) continue;
+      if (!is_coded(group) || (traits_[group] & (kNone | kTurned)) != 0) continue;
       unit[k] = unit_[static_cast<std::size_t>(lanes[k])];
       const std::int16_t* const its = codes_.data() + kGroup * std::size_t{begin_[group]};
       const auto n = static_cast<int>(std::find(from, from + groups, its) - from);
@@ -304,8 +325,10 @@ class StoredMatrices {
     for (int e = 0; e < count; ++e) store_narrowed(to + kGroup * e, entries[e] * inverse);
   }
 
-  std::vector<std::uint32_t> begin_;  // per group: entries before it, in its array
-  std::vector<std::uint8_t> traits_;  // per group
+  std::vector<std::uint32_t> begin_;         // per group: entries before it, in its array
+  std::vector<std::uint32_t> rotations_at_;  // per group: such groups before it
+  std::vector<std::uint8_t> traits_;         // per group
+  Array<S> rotations_;                       // [w x y z][lane] of each
   Array<S> plain_;
   Array<std::int16_t> codes_;
   Array<S> unit_;  // per lane

@@ -209,10 +209,15 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
     const std::uint16_t kind = l.kind[lane / kGroup];
     if (cpu::is_of_finest(kind)) {
       ASSERT_TRUE(finer.children.empty());
-      const std::int32_t child = l.level->children_of(c)[0];
-      EXPECT_EQ(kind - cpu::kOfFinest, finer.kind[finer.lane[child] / kGroup]);
-      EXPECT_EQ(finer.level->place[child], Level::kPassed);
-      EXPECT_EQ(l.level->children_of(c).size(), 1u);
+      std::set<int> octants;
+      for (const std::int32_t child : l.level->children_of(c)) {
+        EXPECT_EQ(cpu::finest_kind(kind), finer.kind[finer.lane[child] / kGroup]);
+        EXPECT_EQ(finer.level->place[child] == Level::kPassed, !cpu::is_of_eight(kind));
+        octants.insert(finer.level->place[child] % 8);
+      }
+      EXPECT_EQ(l.level->children_of(c).size(), cpu::is_of_eight(kind) ? 8u : 1u);
+      EXPECT_EQ(octants.size(), l.level->children_of(c).size());
+      EXPECT_FALSE(cpu::is_of_eight(kind) && kernels::has_hanging(l.level->fold[c]));
     }
     const bool general = kind == cpu::kGeneral || kind == cpu::kGeneralPassed;
     EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || general, cpu::is_held(kind));
