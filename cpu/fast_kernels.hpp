@@ -74,7 +74,8 @@ template <RowKind kKind, class S>
 inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
 
 /// The corners of the lanes of a pack. In rows they follow each other along x, so that two of them
-/// are read and written together, and no numbers but the first of a row are.
+/// are read and written together, and no numbers but the first of a row are: `points` is of
+/// PatchedLevel::heads there, else of its corners.
 /// Inlined, since arrays of packs that a call fills are cleared before.
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
@@ -85,7 +86,7 @@ template <RowKind kKind, class S>
       gather_points(x, points + kGroup * i, out[i]);
       gather_points(x, points + kGroup * (i + 1), out[i + 1]);
     } else {
-      gather_runs<kRunInPack<kKind, S>>(x, points + kGroup * i, out[i], out[i + 1]);
+      gather_runs<kRunInPack<kKind, S>>(x, points + 4 * edge, out[i], out[i + 1]);
     }
   });
 }
@@ -98,7 +99,7 @@ template <RowKind kKind, class S>
       add_to_points(y, points + kGroup * i, f[i]);
       add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
     } else {
-      add_runs<kRunInPack<kKind, S>>(y, points + kGroup * i, f[i], f[i + 1]);
+      add_runs<kRunInPack<kKind, S>>(y, points + 4 * edge, f[i], f[i + 1]);
     }
   });
 }
@@ -106,11 +107,13 @@ template <RowKind kKind, class S>
 /// Calls body(points of the corners, how they lie, first lane) for each pack of a group.
 template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
-  constexpr std::size_t kAhead = 4, kPoints = 8 * kGroup;
-  const std::uint16_t* points = level.corners.data() + kPoints * group;
-  prefetch(points, kPoints * kAhead, kPoints);
   const auto run = [&](auto kind) {
-    for_packs<S>([&](int first) { body(points + first, kind, first); });
+    constexpr bool in_rows = kind() != kScattered;
+    constexpr std::size_t kPoints = in_rows ? 16 : 8 * kGroup, kAhead = in_rows ? 16 : 4;
+    const auto& all = in_rows ? level.heads : level.corners;
+    const std::uint16_t* const points = all.data() + kPoints * group;
+    prefetch(points, kPoints * kAhead, kPoints);
+    for_packs<S>([&](int first) { body(points + (in_rows ? first / 4 : first), kind, first); });
   };
   switch (level.row[group]) {
     case kRow:

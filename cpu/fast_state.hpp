@@ -224,7 +224,7 @@ class FastBackend final : public Backend {
 
   int append_vector(bool exact);
   void load_coarsest();
-  void round_rotations();
+  void round_rotations(std::size_t group);
   template <class T>
   const FinestValues<T>& values_of() const;
   template <class T>

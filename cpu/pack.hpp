@@ -114,8 +114,8 @@ template <bool to_write = false, class S>
 //   for_records      body(lane, record) for the vectors of the lanes, in the order of the lanes
 //   gather_in_order  the points from one on, one in each lane
 //   gather_runs<n>   the left and right ends of cells in rows of n: a lane has the points k and
-//                    k + 1 where the lane before has k - 1 and k. `points` has one number a lane;
-//                    that of the first one in each row is read
+//                    k + 1 where the lane before has k - 1 and k. `points` has the first point of
+//                    every fourth lane; that of the first one in each row is read
 //   add_runs<n>      adds the ends of such cells to their points; what two cells of a row give to a
 //                    point is summed first
 //

@@ -120,7 +120,7 @@ inline void gather_runs(const float* x, const std::uint16_t* points,
                         kernels::Vec3<Pack<float>>& left, kernels::Vec3<Pack<float>>& right) {
   static_assert(kRun == 4 || kRun == 8);
   const float* const low = x + 4 * std::size_t(points[0]);
-  gather_rows(low, kRun == 8 ? low + 16 : x + 4 * std::size_t(points[4]), left, right);
+  gather_rows(low, kRun == 8 ? low + 16 : x + 4 * std::size_t(points[1]), left, right);
 }
 template <int kRun>
 inline void gather_runs(const double* x, const std::uint16_t* points,
@@ -197,7 +197,7 @@ inline void add_runs(float* y, const std::uint16_t* points, const kernels::Vec3<
   if constexpr (kRun == 8)
     add_to_row(first, left, right);
   else
-    add_to_rows(first, y + 4 * std::size_t(points[4]), left, right);
+    add_to_rows(first, y + 4 * std::size_t(points[1]), left, right);
 }
 
 template <class S>

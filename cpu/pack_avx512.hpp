@@ -156,7 +156,7 @@ template <class Body>
 /// Where a lane of cells in rows lies: its point, from that of the first cell in its row.
 template <int kRun, class S>
 S* at_lane(S* x, const std::uint16_t* points, int lane) {
-  return x + 4 * (std::size_t(points[lane / kRun * kRun]) + std::size_t(lane % kRun));
+  return x + 4 * (std::size_t(points[lane / kRun * kRun / 4]) + std::size_t(lane % kRun));
 }
 
 template <int kRun>

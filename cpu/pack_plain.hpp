@@ -56,7 +56,7 @@ template <int kRun, class S>
 void gather_runs(const S* x, const std::uint16_t* points, kernels::Vec3<Pack<S>>& left,
                  kernels::Vec3<Pack<S>>& right) {
   for (int i = 0; i < Pack<S>::kLanes; ++i) {
-    const S* const at = x + 4 * (std::size_t(points[i - i % kRun]) + std::size_t(i % kRun));
+    const S* const at = x + 4 * (std::size_t(points[(i - i % kRun) / 4]) + std::size_t(i % kRun));
     for (int c = 0; c < 3; ++c) {
       left[c].set(i, at[c]);
       right[c].set(i, at[4 + c]);
@@ -68,7 +68,7 @@ template <int kRun, class S>
 void add_runs(S* y, const std::uint16_t* points, const kernels::Vec3<Pack<S>>& left,
               const kernels::Vec3<Pack<S>>& right) {
   for (int begin = 0; begin < Pack<S>::kLanes; begin += kRun) {
-    S* const first = y + 4 * std::size_t(points[begin]);
+    S* const first = y + 4 * std::size_t(points[begin / 4]);
     for (int c = 0; c < 3; ++c) {
       first[c] += left[c][begin];
       for (int i = 1; i < kRun; ++i)

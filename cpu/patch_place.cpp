@@ -230,6 +230,7 @@ void PatchPlacer::fit_ranges() {
   const auto all = static_cast<std::size_t>(groups);
   out_.cell.resize(kGroup * all, -1);
   out_.corners.resize(8 * kGroup * all, kNothing);
+  out_.heads.resize(16 * all, kNothing);
   out_.kind.resize(all, kNoCells);
   out_.row.resize(all, kScattered);
   out_.slots_at.resize(all, -1);

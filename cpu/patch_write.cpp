@@ -26,8 +26,10 @@ void PatchWriter::write() {
   if (!draft_.anew) drop_hanging();
   std::sort(touched_.begin(), touched_.end());
   touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-  for (const std::int32_t g : touched_)
+  for (const std::int32_t g : touched_) {
     out_.row[g] = row_kind(out_.corners.data() + 8 * kGroup * static_cast<std::size_t>(g));
+    out_.set_heads(static_cast<std::size_t>(g));
+  }
 }
 
 void PatchWriter::move_ranges() {
@@ -55,6 +57,7 @@ void PatchWriter::move_group(std::int32_t from, std::int32_t to) {
     std::copy_n(out_.children.begin() + kBlock * from, kBlock, out_.children.begin() + kBlock * to);
   out_.kind[to] = out_.kind[from];
   out_.row[to] = out_.row[from];
+  out_.set_heads(static_cast<std::size_t>(to));
   out_.slots_at[to] = out_.slots_at[from];
   out_.patch_of[to] = draft_.patch;
   for (std::int32_t lane = kGroup * to; lane < kGroup * (to + 1); ++lane)
@@ -103,6 +106,7 @@ void PatchWriter::add_groups() {
     copy(draft_.corners, n, 8 * kGroup, g, out_.corners);
     out_.kind[g] = draft_.kind[n];
     out_.row[g] = draft_.row[n];
+    out_.set_heads(static_cast<std::size_t>(g));
     out_.patch_of[g] = draft_.patch;
     out_.slots_at[g] = -1;
     if (draft_.folded[n] != 0) {

@@ -188,6 +188,8 @@ struct PatchedLevel {
   std::vector<std::int32_t> cell;      // per lane, -1: none
   std::vector<std::int32_t> lane;      // per cell
   Array<std::uint16_t> corners;        // [group][8][kGroup]: points
+  Array<std::uint16_t> heads;          // [group][4][4]: those of corner 0, 2, 4 or 6 in the first
+                                       // lane of each quarter, all that is read of rows
   std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
   std::vector<std::uint8_t> row;       // per group: RowKind
   std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
@@ -226,6 +228,7 @@ struct PatchedLevel {
   std::size_t groups() const { return cell.size() / kGroup; }
   std::size_t vertices() const { return vertex.size(); }
   std::size_t tiles() const { return vertex.size() / kGroup; }
+  void set_heads(std::size_t group);
   /// As if it had never had cells: of no patch, and in no sum.
   void empty_group(std::int32_t g);
   std::int32_t patch_of_cell(std::int32_t c) const {

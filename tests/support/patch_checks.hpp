@@ -38,6 +38,10 @@ inline void expect_all_once(const PatchedLevel& l) {
   std::vector<int> cells(l.level->corner.size()), vertices(l.level->point.size());
   for_groups(l, [&](std::int32_t p, std::size_t g) {
     EXPECT_EQ(l.patch_of[g], p);
+    for (std::size_t edge = 0; edge < 4; ++edge)
+      for (std::size_t lane = 0; lane < kGroup; lane += 4)
+        EXPECT_EQ(l.heads[16 * g + 4 * edge + lane / 4],
+                  l.corners[8 * kGroup * g + 2 * kGroup * edge + lane]);
     for (std::size_t k = 0; k < kGroup; ++k) {
       const std::int32_t c = l.cell[kGroup * g + k];
       if (c < 0) continue;

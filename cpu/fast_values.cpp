@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: MIT
+//
+// What the fast backend makes of rotations: the matrices of coarse levels, diagonal blocks, and the
+// factor of the coarsest level.
+#include <algorithm>
+#include <vector>
+
+#include "core/solve/definite.hpp"
+#include "core/solve/spectrum.hpp"
+#include "cpu/fast_merge.hpp"
+#include "cpu/fast_state.hpp"
+
+namespace kerf::cpu {
+
+/// The matrices of some cells of a stored level, one a lane (-1: none).
+template <class S>
+void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
+                                     Pack<S> (&out)[kEntries]) const {
+  const FastLevel<S>& l = levels_[level];
+  l.matrices.gather(lanes, out);
+  if (level == 1) add_turned(turned_cells(), values_of<S>().materials, scale_, lanes, out);
+}
+
+// Some children of the coarse cells in the lanes, one each. Held components are those of slots, so
+// where there are some the way from corners has two steps.
+template <class S>
+void FastBackend<S>::add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
+                                          Pack<S> (&sum)[kEntries]) const {
+  using P = Pack<S>;
+  const PatchedLevel& packed = levels_[fine].patched;
+  P full[24][24];
+  bool over_slots = false;
+  if (fine == 0) {
+    const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
+    corner_matrices(packed, values_of<S>(), lanes, full);
+    over_slots = lanes.any_held;
+    if (lanes.any_held && lanes.any_folded) fold_matrices<P>(packed, child, full);
+    if (lanes.any_held) mask_matrices(packed, lanes, full);
+  } else {
+    std::int32_t lanes[P::kLanes];
+    for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
+    P entries[kEntries];
+    gather_matrices(fine, lanes, entries);
+    full_from_modes(entries, full);
+  }
+  Weights weights[P::kLanes];
+  const Weights* w[P::kLanes];
+  for (int k = 0; k < P::kLanes; ++k) {
+    w[k] = nullptr;
+    if (child[k] < 0) continue;  // its matrix is zero
+    weights[k] = child_weights(*packed.level, child[k], over_slots);
+    w[k] = &weights[k];
+  }
+  add_product(full, columns_of<P>(w), sum);
+}
+
+template <class S>
+void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
+                                   Pack<S> (&out)[kEntries]) const {
+  using P = Pack<S>;
+  const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
+  GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
+  bool any_other = false;
+  for (P& entry : out) entry = P(0);
+  for (int octant = 0; octant < 8; ++octant) {
+    std::int32_t child[P::kLanes];
+    for (int n = 0; children.others(octant, n, child); ++n) {
+      add_general_children(fine, child, out);
+      any_other = true;
+    }
+  }
+  if (any_other) kernels::modes_from_corners<P>(out, out);
+  if (!children.any_plain()) return;
+  P some[kEntries];
+  std::fill(std::begin(some), std::end(some), P(0));
+  merge_elements(FinestCells<S>{from, values_of<S>()}, values_of<S>().materials, scale_,
+                 children.plain(), some);
+  for (int e = 0; e < kEntries; ++e) out[e] += some[e];
+}
+
+// Rotations of the cells of level 1 that are one element each, or may be. Eight cells of one
+// rotation are exactly an element of twice the side. In single precision, where matrices only
+// precondition, nearly one rotation is enough.
+template <class S>
+void FastBackend<S>::turn() {
+  constexpr double kNear = 0.1;  // radians
+  FastLevel<S>& to = levels_[1];
+  const PatchedLevel& packed = to.patched;
+  // The mass of lumped cells is not that of a lumped one.
+  const bool may_be_one =
+      !kIsDouble && levels_.size() > 2 && (scale_.mass == 0 || !hierarchy_->lumped_mass);
+  const auto groups = static_cast<std::int32_t>(packed.groups());
+#pragma omp parallel for num_threads(threads_) schedule(static) if (groups >= kWorthGroups)
+  for (std::int32_t g = 0; g < groups; ++g) {
+    const auto group = static_cast<std::size_t>(g);
+    if (!is_of_finest(packed.kind[group])) continue;
+    const bool eight = is_of_eight(packed.kind[group]);
+    bool is_one = !eight || may_be_one;
+    if (is_one)
+      for_packs<S>([&](int first) {
+        const std::int32_t* const children = packed.children.data() + 8 * kGroup * group + first;
+        kernels::FinestChild<Pack<S>> child;
+        if (!eight)
+          load_elements(FinestCells<S>{levels_[0].patched, values_of<S>()}, scale_, children,
+                        kAnyMaterial, child);
+        else if (!mean_rotation(values_of<S>(), children, kNear, child.rotation))
+          is_one = false;
+        to.matrices.store(group, first, child.rotation);
+      });
+    if (!is_one) to.matrices.do_not_turn(group);
+  }
+}
+
+template <class S>
+void FastBackend<S>::coarsen(int fine) {
+  using P = Pack<S>;
+  const FastLevel<S>& from = levels_[fine];
+  FastLevel<S>& to = levels_[fine + 1];
+  const PatchedLevel& packed = to.patched;
+  const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
+  to.matrices.start(packed, fine == 0 && !coarsest, scale_.mass != 0);
+  if (fine == 0) turn();
+  to.matrices.allocate();
+  const auto groups = static_cast<std::int32_t>(packed.groups());
+  const std::vector<PackedMaterial<S>>& materials = values_of<S>().materials;
+  // General cells cost many times as much as others, and lie together.
+#pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
+  for (std::int32_t g = 0; g < groups; ++g) {
+    const auto group = static_cast<std::size_t>(g);
+    const std::uint16_t kind = packed.kind[group];
+    if (kind == kNoCells || kind == kIdle || to.matrices.is_turned(group)) continue;
+    const bool passed = kind == kPassed || kind == kHeldPassed;
+    for_packs<S>([&](int first) {
+      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
+      const auto cells = packed.cell.begin() + kGroup * g + first;
+      P out[kEntries];
+      if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {
+        std::fill(out, out + kEntries, P(0));
+        return to.matrices.store(group, first, out);
+      }
+      if (kind == kGeneral || kind == kGeneralPassed)
+        merge_general(fine, group, first, out);
+      else if (fine == 0)
+        merge_elements(FinestCells<S>{from.patched, values_of<S>()}, materials, scale_, children,
+                       out);
+      else if (fine == 1 && !passed && turned_cells().are_all(children, 8))
+        merge_elements(turned_cells(), materials, scale_, children, out);
+      else
+        merge_stored<S>(
+            [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
+            children, passed, to.matrices.with_translations(group), out);
+      to.matrices.store(group, first, out);
+    });
+  }
+}
+
+template <class S>
+void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S>>& upper,
+                 const Vec3<Pack<S>>& lower) {
+  using P = Pack<S>;
+  const std::uint8_t* fixed = l.fixed(tile, first);
+  P keep[3];
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
+  const auto inverse = kernels::inverse_semidefinite(
+      kernels::Sym3<P>{keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+                       keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z});
+  S* to = l.inverse_diagonal.data() + 2 * kTileScalars * tile + first;
+  const P entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
+  for (int e = 0; e < 6; ++e) store_pack(to + kGroup * e, entries[e]);
+}
+
+template <class S>
+void invert_own(FastLevel<S>& l, const Patch& patch, const BlockPoints<S>& from) {
+  for (std::int32_t v = patch.own.first; v < patch.own.end(); v += kGroup)
+    for_packs<S>([&](int first) {
+      const std::uint16_t* points = l.patched.own_point.data() + v + first;
+      invert_tile(l, static_cast<std::size_t>(v / kGroup), first,
+                  gathered(static_cast<const S*>(from.upper), points),
+                  gathered(static_cast<const S*>(from.lower), points));
+    });
+}
+
+template <class S>
+void FastBackend<S>::prepare(int level) {
+  settle();
+  FastLevel<S>& l = levels_[level];
+  const PatchedLevel& packed = l.patched;
+  const std::size_t copies = packed.copy_point.size();
+  S* const upper = partial_sums<S>(8 * copies);
+  S* const lower = upper + 4 * copies;
+  for_patches(0, static_cast<std::int32_t>(packed.patches.size()), threads_, [&](std::int32_t p) {
+    const Patch& patch = packed.patches[p];
+    thread_local PointBuffer<S> buffer;
+    const std::size_t scalars = 4 * static_cast<std::size_t>(patch.points);
+    S* const blocks = buffer.reserve(2 * scalars);
+    std::fill_n(blocks, 2 * scalars, S(0));
+    const BlockPoints<S> to{blocks, blocks + scalars};
+    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
+      const auto group = static_cast<std::size_t>(g);
+      if (packed.idle(group)) continue;
+      if (level > 0 && !l.matrices.is_turned(group)) {
+        add_stored_diagonals(packed, l.matrices, folds_, group, to);
+        continue;
+      }
+      const CellKind kind = element_kind(level, group);
+      add_element_diagonals(
+          packed, kind, values_of<S>().materials[kind.material].modes, scale_, folds_, group,
+          [&](int first) {
+            return level == 0 ? values_of<S>().quaternion(group, first)
+                              : l.matrices.rotation(group, first);
+          },
+          to);
+    }
+    invert_own(l, patch, to);
+    for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
+      std::copy_n(to.upper + 4 * std::size_t(packed.copy_point[k]), 4, upper + 4 * std::size_t(k));
+      std::copy_n(to.lower + 4 * std::size_t(packed.copy_point[k]), 4, lower + 4 * std::size_t(k));
+    }
+  });
+  parallel(static_cast<std::int32_t>(packed.shared_tiles.size()), kWorthTiles, [&](std::int32_t n) {
+    for_packs<S>([&](int first) {
+      invert_tile(l, static_cast<std::size_t>(packed.shared_tiles[n]), first,
+                  shared_sums(packed, n, first, upper), shared_sums(packed, n, first, lower));
+    });
+  });
+  if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size()))
+    l.bound = estimate_spectral_bound(*this, level, *packed.level);
+}
+
+template <class S>
+void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
+                                   Pack<double> (&full)[24][24]) const {
+  using P = Pack<double>;
+  const PatchedLevel& packed = levels_[level].patched;
+  bool any_folded = false;
+  if (level == 0) {
+    const FinestLanes<double> lanes(packed, exact_, scale_, cells);
+    corner_matrices(packed, exact_, lanes, full);
+    if (lanes.any_folded) fold_matrices<P>(packed, cells, full);
+    if (lanes.any_held) mask_matrices(packed, lanes, full);
+    return;
+  }
+  std::int32_t lanes[Pack<S>::kLanes];
+  std::fill(std::begin(lanes), std::end(lanes), -1);
+  for (int k = 0; k < P::kLanes; ++k) {
+    if (cells[k] < 0) continue;
+    lanes[k] = packed.lane[cells[k]];
+    any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
+  }
+  Pack<S> entries[kEntries];
+  P exact[kEntries];
+  gather_matrices(level, lanes, entries);
+  for (int e = 0; e < kEntries; ++e)
+    for (int k = 0; k < P::kLanes; ++k) exact[e].set(k, static_cast<double>(entries[e][k]));
+  full_from_modes(exact, full);
+  if (any_folded) fold_matrices<P>(packed, cells, full);
+}
+
+void read_lane(const Pack<double> (&full)[24][24], int lane, std::span<double> out) {
+  for (int i = 0; i < 24; ++i)
+    for (int j = 0; j <= i; ++j)
+      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][lane];
+}
+
+template <class S>
+void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<double> out) const {
+  std::int32_t cells[Pack<double>::kLanes];
+  std::fill(std::begin(cells), std::end(cells), -1);
+  cells[0] = cell;
+  Pack<double> full[24][24];
+  read_matrices(level, cells, full);
+  read_lane(full, 0, out);
+}
+
+/// The matrices of the coarsest level, several cells at a time.
+template <class S>
+void FastBackend<S>::assemble_coarsest(bool definite) {
+  constexpr double kRounding = 1e-6;
+  constexpr int kLanes = Pack<double>::kLanes;
+  const Level& level = hierarchy_->levels.back();
+  Pack<double> full[24][24];
+  coarsest_->assemble(level, [&](std::int32_t cell, std::span<double> out) {
+    if (cell % kLanes == 0) {
+      std::int32_t cells[kLanes];
+      for (int k = 0; k < kLanes; ++k) cells[k] = cell + k < level.cells() ? cell + k : -1;
+      read_matrices(static_cast<int>(levels_.size()) - 1, cells, full);
+    }
+    read_lane(full, cell % kLanes, out);
+    if (definite) make_definite(out, kRounding);
+  });
+}
+
+// What supports leave of a coarse matrix can be singular, and rounding in single precision makes
+// some indefinite. There, cell matrices are made definite one by one; as that leaves directions
+// with hardly any stiffness, the share of the diagonal grows too.
+template <class S>
+void FastBackend<S>::factor_coarsest() {
+  constexpr double kGrowth = 100;
+  constexpr int kMost = kIsDouble ? 1 : 6;  // tries: up to a share of 1e-2
+  const int last = static_cast<int>(levels_.size()) - 1;
+  factored_ = false;
+  double share = AssembledLevel::kShare;
+  for (int tries = 1;; ++tries, share *= kGrowth) {
+    assemble_coarsest(tries > 1);
+    if (last > 0) coarsest_->strengthen_diagonal(share);
+    factored_ = coarsest_factor_.factor(*coarsest_, threads_);
+    if (factored_) return;
+    expects(last > 0 && tries < kMost,
+            "the system matrix is not positive definite: in static mode some part of the body can "
+            "move freely and needs a [[support]]; otherwise sizes, moduli or the time step are out "
+            "of range");
+  }
+}
+
+template class FastBackend<float>;
+template class FastBackend<double>;
+
+}  // namespace kerf::cpu
