@@ -3,6 +3,7 @@
 // What the fast backend does within a cycle, and to vectors.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "cpu/fast_state.hpp"
@@ -39,32 +40,30 @@ void FastBackend<S>::smooth(int level, SweepOrder, int count) {
   for (int i = 0; i < count; ++i) chebyshev(level);
 }
 
-/// Coefficients of the steps: direction = keep * direction + take * D^-1 r.
+/// Steps of damped Jacobi whose product is the polynomial of Chebyshev: the inverses of its roots.
+/// Those of the largest and the smallest in turn, so that what rounding leaves of one is not blown
+/// up by many.
 struct ChebyshevSteps {
-  double sigma, delta, rho;
+  double lower, upper;
+  int degree;
 
-  ChebyshevSteps(double upper, double lower)
-      : sigma((upper + lower) / (upper - lower)), delta(0.5 * (upper - lower)), rho(1 / sigma) {}
-  double first_take() const { return 1 / (sigma * delta); }
-  /// keep and take of the next step but the first.
-  std::pair<double, double> next() {
-    const double following = 1 / (2 * sigma - rho);
-    const std::pair<double, double> out{following * rho, 2 * following / delta};
-    rho = following;
-    return out;
+  double operator[](int n) const {
+    const int root = n % 2 == 0 ? n / 2 : degree - 1 - n / 2;
+    return 2 /
+           (upper + lower + (upper - lower) * std::cos(std::numbers::pi * (root + 0.5) / degree));
   }
 };
 
-/// One step, from value(tile, first lane): u as it was before it. In the second one, where the
-/// first was from zero, that is the direction too, and shared vertices have it put first.
+/// One step, from value(tile, first lane): u as it was before it. `put`: shared vertices have it
+/// put first, since it is not in u.
 template <class S>
 template <class Value>
-void FastBackend<S>::chebyshev_step(int level, const Value& value, S keep, S take, StepKind kind,
-                                    bool last) {
+void FastBackend<S>::chebyshev_step(int level, const Value& value, double step, bool put) {
   using V = Vec3<Pack<S>>;
   FastLevel<S>& l = levels_[level];
-  S *u = l.at(kSolution), *d = l.at(kDirection);
+  S* u = l.at(kSolution);
   const S* f = l.at(kRight);
+  const auto by = static_cast<S>(step);
   const S* correction = waiting_ == level ? levels_[level + 1].at(kSolution) : nullptr;
   const auto start = [&](std::size_t patch) {
     auto& points = transfer_here<S>();
@@ -75,40 +74,35 @@ void FastBackend<S>::chebyshev_step(int level, const Value& value, S keep, S tak
   sweep<S>(
       level,
       [&](std::size_t tile) {
-        if (kind != kSecond) return;
+        if (!put) return;
         for_packs<S>([&](int first) { store_tile(u, tile, first, value(tile, first)); });
       },
       start, value, u,
       [&](std::size_t group, const S* x, S* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const V& sum, const auto& before) {
         const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
-        const V at = before();
-        V direction = Pack<S>(take) * l.times_inverse(tile, first, r);
-        if (kind == kSecond)
-          direction += Pack<S>(keep) * at;
-        else if (kind == kLater)
-          direction += Pack<S>(keep) * load_tile(static_cast<const S*>(d), tile, first);
-        if (!last) store_tile(d, tile, first, direction);
-        store_tile(u, tile, first, at + direction);
+        store_tile(u, tile, first, before() + Pack<S>(by) * l.times_inverse(tile, first, r));
         return Sums{};
       });
 }
 
-// Chebyshev acceleration of block Jacobi on [smallest, 1] * bound; residual, direction and update
-// of a vertex in one pass behind the sum of what its cells add. From a zero guess the first step
-// needs no product: it is made on the fly where the second one reads it. A correction that waits is
-// added there too.
-// Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, algorithm 12.1.
+// Chebyshev acceleration of block Jacobi on [smallest, 1] * bound, as steps by the inverses of the
+// roots of its polynomial: the recursion would carry a direction through memory. Residual and
+// update of a vertex in one pass behind the sum of what its cells add. From a zero guess the first
+// step needs no product: it is made on the fly where the second one reads it. A correction that
+// waits is added there too.
+// Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, section 12.3.
 template <class S>
 void FastBackend<S>::chebyshev(int level) {
   if (waiting_ != level) settle();
   FastLevel<S>& l = levels_[level];
-  ChebyshevSteps steps(l.bound, smoother_.smallest * l.bound);
+  const int degree = smoother_.degree;
+  const ChebyshevSteps steps{smoother_.smallest * l.bound, l.bound, degree};
   S* u = l.at(kSolution);
   const S* f = l.at(kRight);
-  const S first_take = static_cast<S>(steps.first_take());
+  const auto first_step = static_cast<S>(steps[0]);
   const auto from_zero = [&](std::size_t tile, int first) {
-    return Pack<S>(first_take) * l.times_inverse(tile, first, load_tile(f, tile, first));
+    return Pack<S>(first_step) * l.times_inverse(tile, first, load_tile(f, tile, first));
   };
   const auto corrected = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first) +
@@ -117,34 +111,23 @@ void FastBackend<S>::chebyshev(int level) {
   const auto as_it_is = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first);
   };
-  const int degree = smoother_.degree;
-  int done = 0;
+  int done = 1;
   if (l.solution_is_zero && degree == 1) {
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
       for_packs<S>([&](int first) { store_tile(u, tile, first, from_zero(tile, first)); });
     });
-    done = 1;
   } else if (l.solution_is_zero) {
-    const auto [keep, take] = steps.next();
-    chebyshev_step(level, from_zero, static_cast<S>(keep), static_cast<S>(take), kSecond,
-                   degree == 2);
+    chebyshev_step(level, from_zero, steps[1], true);
     done = 2;
+  } else if (waiting_ == level) {
+    correct_shared(level);
+    chebyshev_step(level, corrected, steps[0], false);
   } else {
-    if (waiting_ == level) {
-      correct_shared(level);
-      chebyshev_step(level, corrected, S(0), first_take, kFirst, degree == 1);
-    } else {
-      chebyshev_step(level, as_it_is, S(0), first_take, kFirst, degree == 1);
-    }
-    done = 1;
+    chebyshev_step(level, as_it_is, steps[0], false);
   }
   waiting_ = -1;
   l.solution_is_zero = false;
-  for (; done < degree; ++done) {
-    const auto [keep, take] = steps.next();
-    chebyshev_step(level, as_it_is, static_cast<S>(keep), static_cast<S>(take), kLater,
-                   done + 1 == degree);
-  }
+  for (; done < degree; ++done) chebyshev_step(level, as_it_is, steps[done], false);
 }
 
 template <class S>

@@ -272,10 +272,8 @@ class FastBackend final : public Backend {
   void add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
                             Pack<S> (&sum)[kEntries]) const;
   void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
-  /// Of Chebyshev: the first has no direction yet; the second here is that behind one from zero.
-  enum StepKind { kFirst, kSecond, kLater };
   template <class Value>
-  void chebyshev_step(int level, const Value& value, S keep, S take, StepKind kind, bool last);
+  void chebyshev_step(int level, const Value& value, double step, bool put);
   void chebyshev(int level);
   void correct_shared(int level);
   void settle();

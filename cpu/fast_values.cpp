@@ -224,8 +224,10 @@ void FastBackend<S>::prepare(int level) {
                   shared_sums(packed, n, first, upper), shared_sums(packed, n, first, lower));
     });
   });
-  if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size()))
+  if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size())) {
     l.bound = estimate_spectral_bound(*this, level, *packed.level);
+    l.vectors.release(kDirection);  // nothing else here asks for it
+  }
 }
 
 template <class S>
