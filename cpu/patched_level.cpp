@@ -24,7 +24,7 @@ constexpr std::size_t kCrowd = 60000, kCellPoints = 15;
 /// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads: more
 /// of them as long as they are not so small that most of their vertices are shared.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kMost = 16384, kSmall = 2048, kLeast = 256;
+  constexpr std::int32_t kMost = 32768, kSmall = 2048, kLeast = 256;
   std::int32_t size = kMost;
   while (size > kLeast && cells < (size > kSmall ? 32 : 16) * size) size /= 2;
   return size;
