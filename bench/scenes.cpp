@@ -79,6 +79,7 @@ Size size_named(const std::string& name) {
 
 const std::vector<SceneInfo>& scenes() {
   static const std::vector<SceneInfo> all{
+      {"box46", "uncut cube, 46^3 cells: a hundred thousand"},
       {"box64", "uncut cube, 64^3 cells, nu 0.3"},
       {"box100", "uncut cube, 100^3 cells: a million cells"},
       {"box128", "uncut cube, 128^3 cells, nu 0.3"},
@@ -92,6 +93,7 @@ const std::vector<SceneInfo>& scenes() {
       {"comb-aligned", "cube of 48^3 cells, eight blades along the grid in its upper half"},
       {"comb-rotated", "the same, blades turned by 30 degrees"},
       {"box1m-unknowns", "uncut cube, 69^3 cells: a million unknowns"},
+      {"bunny1m-unknowns", "Stanford bunny, 117 uniform cells long: a million unknowns"},
       {"box7m", "uncut cube, 192^3 cells: seven million cells, the long solve alone", true}};
   return all;
 }
@@ -100,8 +102,10 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
                                           const std::vector<fs::path>& folders,
                                           std::string& missing) {
   const MeshScene bunny{"bunny.toml", "bunny00.off", 96, 28};
+  const MeshScene large_bunny{"bunny.toml", "bunny00.off", 117, 30};
   const MeshScene armadillo{"armadillo.toml", "armadillo.obj", 128, 40};
   std::optional<SimulationSetup> out;
+  if (name == "box46") out = cube(Sizes{46, 5}.of(size));
   if (name == "box64") out = cube(Sizes{64, 6}.of(size));
   if (name == "box100") out = cube(Sizes{100, 7}.of(size));
   if (name == "box128") out = cube(Sizes{128, 8}.of(size));
@@ -110,6 +114,8 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
   if (name == "comb-aligned") out = comb(Sizes{48, 10}.of(size), 0);
   if (name == "comb-rotated") out = comb(Sizes{48, 10}.of(size), std::numbers::pi / 6);
   if (name == "bunny") out = real_body(bunny, size, false, false, folders, missing);
+  if (name == "bunny1m-unknowns")
+    out = real_body(large_bunny, size, false, false, folders, missing);
   if (name == "bunny-octree") out = real_body(bunny, size, true, false, folders, missing);
   if (name == "bunny-cut") out = real_body(bunny, size, true, true, folders, missing);
   if (name == "armadillo") out = real_body(armadillo, size, false, false, folders, missing);
