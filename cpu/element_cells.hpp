@@ -92,32 +92,49 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
   return out;
 }
 
+/// Rotations of some lanes of level 0 (-1: the identity).
+template <class S>
+void load_rotations(const FinestValues<S>& values, const std::int32_t* lanes,
+                    kernels::Quat<Pack<S>>& out) {
+  constexpr int kLanes = Pack<S>::kLanes;
+  const S* const from = values.rotation.data();
+#if KERF_PACK_BITS == 512
+  if constexpr (kLanes == kGroup) {
+    // Children of cells side by side are mostly every other cell of two groups.
+    if (const int within = lanes[0] % kGroup; are_every_other(lanes) && within < 2) {
+      const S* const at = from + values.place(static_cast<std::size_t>(lanes[0] - within));
+      const auto component = [&](int c) {
+        return every_other(at + kGroup * c, at + kGroup * (c + 4), within);
+      };
+      out = {component(0), component(1), component(2), component(3)};
+      return;
+    }
+  }
+#endif
+  alignas(kPackBytes) S q[4][kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    const S* const at = from + values.place(static_cast<std::size_t>(std::max(lanes[k], 0)));
+    for (std::size_t c = 0; c < 4; ++c) q[c][k] = lanes[k] < 0 ? S(c == 0 ? 1 : 0) : at[kGroup * c];
+  }
+  out = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+}
+
 /// The mean rotations of eight cells of level 0 each; false where one is farther than `angle` from
 /// its mean. `children`: [octant][kGroup], lanes of level 0, -1: none of the eight.
 template <class S>
 bool mean_rotation(const FinestValues<S>& values, const std::int32_t* children, double angle,
                    kernels::Quat<Pack<S>>& mean) {
   using P = Pack<S>;
-  alignas(kPackBytes) S q[8][4][P::kLanes];
-  for (int octant = 0; octant < 8; ++octant)
-    for (int k = 0; k < P::kLanes; ++k) {
-      const std::int32_t lane = children[kGroup * octant + k];
-      const S* const from =
-          values.rotation.data() + values.place(static_cast<std::size_t>(std::max(lane, 0)));
-      for (std::size_t c = 0; c < 4; ++c)
-        q[octant][c][k] = lane < 0 ? S(c == 0 ? 1 : 0) : from[kGroup * c];
-    }
-  const auto of = [&](int octant) {
-    return kernels::Quat<P>{load_pack(q[octant][0]), load_pack(q[octant][1]),
-                            load_pack(q[octant][2]), load_pack(q[octant][3])};
-  };
+  kernels::Quat<P> of[8];
+  kernels::unrolled<8>(
+      [&](auto octant) { load_rotations(values, children + kGroup * octant, of[octant]); });
   const auto dot = [](const kernels::Quat<P>& a, const kernels::Quat<P>& b) {
     return fma(a.w, b.w, fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)));
   };
-  const kernels::Quat<P> first = of(0);
+  const kernels::Quat<P> first = of[0];
   mean = first;
   kernels::unrolled<7>([&](auto n) {
-    const kernels::Quat<P> other = of(n + 1);
+    const kernels::Quat<P>& other = of[n + 1];
     const P sign = select(dot(first, other) < P(S(0)), P(S(-1)), P(S(1)));  // of one rotation
     mean = {fma(sign, other.w, mean.w), fma(sign, other.x, mean.x), fma(sign, other.y, mean.y),
             fma(sign, other.z, mean.z)};
@@ -126,7 +143,7 @@ bool mean_rotation(const FinestValues<S>& values, const std::int32_t* children, 
   const P least = P(static_cast<S>(std::cos(0.5 * angle) * std::cos(0.5 * angle)));
   auto near = P(S(0)) < P(S(1));
   kernels::unrolled<8>([&](auto octant) {
-    const P cosine = dot(mean, of(octant));
+    const P cosine = dot(mean, of[octant]);
     near = near && !(cosine * cosine < least);
   });
   return all(near);

@@ -37,6 +37,22 @@ inline Pack<double> sqrt(const Pack<double>& a) {
   return Pack<double>::Vector(_mm512_sqrt_pd(__m512d(a.v)));
 }
 
+inline __m512i even_numbers() {
+  return _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+}
+/// Whether numbers, not negative, follow each other in steps of two.
+inline bool are_every_other(const std::int32_t* numbers) {
+  const __m512i expected = _mm512_add_epi32(_mm512_set1_epi32(numbers[0]), even_numbers());
+  return numbers[0] >= 0 &&
+         _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), expected) == 0xFFFF;
+}
+/// Every other of the scalars at `low` and then at `high`, from the first or the second one on.
+inline Pack<float> every_other(const float* low, const float* high, int first) {
+  const __m512i which = _mm512_add_epi32(_mm512_set1_epi32(first), even_numbers());
+  return Pack<float>::Vector(
+      _mm512_permutex2var_ps(_mm512_loadu_ps(low), which, _mm512_loadu_ps(high)));
+}
+
 /// Records of four registers, one after the other, by components.
 inline void transpose(__m512 a, __m512 b, __m512 c, __m512 d, kernels::Vec3<Pack<float>>& out) {
   const __m512i xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
