@@ -24,7 +24,7 @@ enum VectorId : int {
   kSolution,   ///< u of A u = f
   kRight,      ///< f
   kResidual,   ///< f - A u
-  kDirection,  ///< of the Chebyshev recursion
+  kDirection,  ///< of a recursion: Chebyshev (not of the fast backend), Lanczos
   kScratch,    ///< product of the Chebyshev recursion and of the Krylov methods
   kKrylovX,    ///< two vectors of the K-cycle
   kKrylovV,

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -45,9 +44,9 @@ struct TurnedCells {
     return element_kind(finest.kinds, level.kind[lane / kGroup]);
   }
   const S* rotation(std::size_t lane) const { return matrices.rotation_of(lane); }
-  /// Whether all lanes of some that have a cell are such.
-  bool are_all(const std::int32_t* lanes, int octants) const {
-    for (int octant = 0; octant < octants; ++octant)
+  /// Whether all children are such. `lanes`: [octant][kGroup], -1: none.
+  bool are_all(const std::int32_t* lanes) const {
+    for (int octant = 0; octant < 8; ++octant)
       for (int k = 0; k < Pack<S>::kLanes; ++k)
         if (const std::int32_t lane = lanes[kGroup * octant + k];
             lane >= 0 && !matrices.is_turned(static_cast<std::size_t>(lane / kGroup)))
@@ -58,25 +57,49 @@ struct TurnedCells {
 
 constexpr int kAnyMaterial = -1;
 
-/// Elements of some lanes (-1: none) that are of `material`; others have no stiffness.
+/// Rotations of some lanes (-1: the identity). Those of one group lie behind those of the one
+/// before.
+template <class Cells, class S>
+void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat<Pack<S>>& out) {
+  constexpr int kLanes = Pack<S>::kLanes;
+#if KERF_PACK_BITS == 512
+  if constexpr (kLanes == kGroup) {
+    // Children of cells side by side are mostly every other cell of two groups.
+    if (const int within = lanes[0] % kGroup; are_every_other(lanes) && within < 2) {
+      const S* const at = cells.rotation(static_cast<std::size_t>(lanes[0] - within));
+      const auto component = [&](int c) {
+        return every_other(at + kGroup * c, at + kGroup * (c + 4), within);
+      };
+      out = {component(0), component(1), component(2), component(3)};
+      return;
+    }
+  }
+#endif
+  alignas(kPackBytes) S q[4][kLanes];
+  for (int k = 0; k < kLanes; ++k) {
+    q[0][k] = 1;
+    q[1][k] = q[2][k] = q[3][k] = 0;
+    if (lanes[k] < 0) continue;
+    const S* const from = cells.rotation(static_cast<std::size_t>(lanes[k]));
+    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
+  }
+  out = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+}
+
+/// Elements of some lanes (-1: none); those that are not of `material` have no stiffness.
 template <class Cells, class S>
 void load_elements(const Cells& cells, const OperatorScale& scale, const std::int32_t* lanes,
                    int material, kernels::FinestChild<Pack<S>>& out) {
   constexpr int kLanes = Pack<S>::kLanes;
-  alignas(kPackBytes) S q[4][kLanes], stiffness[kLanes], mass[kLanes];
+  alignas(kPackBytes) S stiffness[kLanes] = {}, mass[kLanes] = {};
   for (int k = 0; k < kLanes; ++k) {
-    q[0][k] = 1;
-    q[1][k] = q[2][k] = q[3][k] = stiffness[k] = mass[k] = 0;
     if (lanes[k] < 0) continue;
-    const auto lane = static_cast<std::size_t>(lanes[k]);
-    const CellKind& kind = cells.kind(lane);
+    const CellKind& kind = cells.kind(static_cast<std::size_t>(lanes[k]));
     if (material != kAnyMaterial && kind.material != material) continue;
-    const S* const from = cells.rotation(lane);
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
     stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
     mass[k] = static_cast<S>(scale.mass * kind.mass);
   }
-  out.rotation = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+  load_rotations(cells, lanes, out.rotation);
   out.stiffness = load_pack(stiffness);
   out.mass = load_pack(mass);
 }
@@ -92,42 +115,15 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
   return out;
 }
 
-/// Rotations of some lanes of level 0 (-1: the identity).
+/// The mean rotations of eight cells each; false where the cosine of half the angle of one from its
+/// mean is less than `least`. `children`: [octant][kGroup], lanes of the cells, -1: none of them.
 template <class S>
-void load_rotations(const FinestValues<S>& values, const std::int32_t* lanes,
-                    kernels::Quat<Pack<S>>& out) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  const S* const from = values.rotation.data();
-#if KERF_PACK_BITS == 512
-  if constexpr (kLanes == kGroup) {
-    // Children of cells side by side are mostly every other cell of two groups.
-    if (const int within = lanes[0] % kGroup; are_every_other(lanes) && within < 2) {
-      const S* const at = from + values.place(static_cast<std::size_t>(lanes[0] - within));
-      const auto component = [&](int c) {
-        return every_other(at + kGroup * c, at + kGroup * (c + 4), within);
-      };
-      out = {component(0), component(1), component(2), component(3)};
-      return;
-    }
-  }
-#endif
-  alignas(kPackBytes) S q[4][kLanes];
-  for (int k = 0; k < kLanes; ++k) {
-    const S* const at = from + values.place(static_cast<std::size_t>(std::max(lanes[k], 0)));
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = lanes[k] < 0 ? S(c == 0 ? 1 : 0) : at[kGroup * c];
-  }
-  out = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
-}
-
-/// The mean rotations of eight cells of level 0 each; false where one is farther than `angle` from
-/// its mean. `children`: [octant][kGroup], lanes of level 0, -1: none of the eight.
-template <class S>
-bool mean_rotation(const FinestValues<S>& values, const std::int32_t* children, double angle,
+bool mean_rotation(const FinestCells<S>& cells, const std::int32_t* children, double least,
                    kernels::Quat<Pack<S>>& mean) {
   using P = Pack<S>;
   kernels::Quat<P> of[8];
   kernels::unrolled<8>(
-      [&](auto octant) { load_rotations(values, children + kGroup * octant, of[octant]); });
+      [&](auto octant) { load_rotations(cells, children + kGroup * octant, of[octant]); });
   const auto dot = [](const kernels::Quat<P>& a, const kernels::Quat<P>& b) {
     return fma(a.w, b.w, fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)));
   };
@@ -140,11 +136,11 @@ bool mean_rotation(const FinestValues<S>& values, const std::int32_t* children, 
             fma(sign, other.z, mean.z)};
   });
   mean = kernels::normalised(mean);
-  const P least = P(static_cast<S>(std::cos(0.5 * angle) * std::cos(0.5 * angle)));
+  const P square = P(static_cast<S>(least * least));
   auto near = P(S(0)) < P(S(1));
   kernels::unrolled<8>([&](auto octant) {
     const P cosine = dot(mean, of[octant]);
-    near = near && !(cosine * cosine < least);
+    near = near && !(cosine * cosine < square);
   });
   return all(near);
 }

@@ -109,7 +109,7 @@ template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
   const auto run = [&](auto kind) {
     constexpr bool in_rows = kind() != kScattered;
-    constexpr std::size_t kPoints = in_rows ? 16 : 8 * kGroup, kAhead = in_rows ? 16 : 4;
+    constexpr std::size_t kPoints = in_rows ? kHeads : 8 * kGroup, kAhead = in_rows ? 16 : 4;
     const auto& all = in_rows ? level.heads : level.corners;
     const std::uint16_t* const points = all.data() + kPoints * group;
     prefetch(points, kPoints * kAhead, kPoints);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The state of the fast backend and its loops; what it computes is in fast_backend.cpp (values and
-// forces) and fast_cycle.cpp (the cycle and vectors).
+// The state of the fast backend and its loops; what it computes is in fast_backend.cpp (loading,
+// rotations and forces), fast_values.cpp (matrices) and fast_cycle.cpp (the cycle and vectors).
 #pragma once
 
 #include <algorithm>

@@ -3,6 +3,7 @@
 // What the fast backend makes of rotations: the matrices of coarse levels, diagonal blocks, and the
 // factor of the coarsest level.
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "core/solve/definite.hpp"
@@ -84,8 +85,10 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
 template <class S>
 void FastBackend<S>::turn() {
   constexpr double kNear = 0.1;  // radians
+  const double least = std::cos(0.5 * kNear);
   FastLevel<S>& to = levels_[1];
   const PatchedLevel& packed = to.patched;
+  const FinestCells<S> cells{levels_[0].patched, values_of<S>()};
   // The mass of lumped cells is not that of a lumped one.
   const bool may_be_one =
       !kIsDouble && levels_.size() > 2 && (scale_.mass == 0 || !hierarchy_->lumped_mass);
@@ -99,13 +102,12 @@ void FastBackend<S>::turn() {
     if (is_one)
       for_packs<S>([&](int first) {
         const std::int32_t* const children = packed.children.data() + 8 * kGroup * group + first;
-        kernels::FinestChild<Pack<S>> child;
+        kernels::Quat<Pack<S>> rotation;
         if (!eight)
-          load_elements(FinestCells<S>{levels_[0].patched, values_of<S>()}, scale_, children,
-                        kAnyMaterial, child);
-        else if (!mean_rotation(values_of<S>(), children, kNear, child.rotation))
+          load_rotations(cells, children, rotation);
+        else if (!mean_rotation(cells, children, least, rotation))
           is_one = false;
-        to.matrices.store(group, first, child.rotation);
+        to.matrices.store(group, first, rotation);
       });
     if (!is_one) to.matrices.do_not_turn(group);
   }
@@ -143,7 +145,7 @@ void FastBackend<S>::coarsen(int fine) {
       else if (fine == 0)
         merge_elements(FinestCells<S>{from.patched, values_of<S>()}, materials, scale_, children,
                        out);
-      else if (fine == 1 && !passed && turned_cells().are_all(children, 8))
+      else if (fine == 1 && !passed && turned_cells().are_all(children))
         merge_elements(turned_cells(), materials, scale_, children, out);
       else
         merge_stored<S>(

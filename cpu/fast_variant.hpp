@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
 // The fast backend of one instruction set. In a build for distribution fast_backend.cpp,
-// fast_cycle.cpp and fast_variant.cpp are compiled for several (cpu/CMakeLists.txt).
+// fast_cycle.cpp, fast_values.cpp and fast_variant.cpp are compiled for several
+// (cpu/CMakeLists.txt).
 //
 // Needs   What both sides of these functions see has the same layout for every instruction set: of
 //         the standard library and of kerf, no Eigen, no packs. What is thrown is known by its

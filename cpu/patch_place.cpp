@@ -76,8 +76,8 @@ void PatchPlacer::share(std::int32_t v) {
   out_.fixed[to] = level_.fixed[v];
 }
 
-/// A vertex that a second patch has becomes a shared one, and stays so. Those of the same two patches
-/// get numbers one after the other, so that what these have of them is read in order.
+/// A vertex that a second patch has becomes a shared one, and stays so. Those of the same two
+/// patches get numbers one after the other, so that what these have of them is read in order.
 void PatchPlacer::find_shared() {
   std::vector<std::pair<std::int32_t, std::int32_t>> found;  // first patch, vertex
   for (const Draft& draft : *drafts_) {
@@ -230,7 +230,7 @@ void PatchPlacer::fit_ranges() {
   const auto all = static_cast<std::size_t>(groups);
   out_.cell.resize(kGroup * all, -1);
   out_.corners.resize(8 * kGroup * all, kNothing);
-  out_.heads.resize(16 * all, kNothing);
+  out_.heads.resize(kHeads * all, kNothing);
   out_.kind.resize(all, kNoCells);
   out_.row.resize(all, kScattered);
   out_.slots_at.resize(all, -1);

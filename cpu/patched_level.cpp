@@ -466,7 +466,7 @@ PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change,
 void PatchedLevel::set_heads(std::size_t group) {
   for (std::size_t edge = 0; edge < 4; ++edge)
     for (std::size_t quarter = 0; quarter < 4; ++quarter)
-      heads[16 * group + 4 * edge + quarter] =
+      heads[kHeads * group + 4 * edge + quarter] =
           corners[8 * kGroup * group + 2 * kGroup * edge + kGroup / 4 * quarter];
 }
 
@@ -494,7 +494,8 @@ void Range::grow(std::size_t count, bool spare, std::int32_t& end) {
 }
 
 std::size_t PatchedLevel::bytes() const {
-  return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) + bytes_of(heads) +
+  return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) +
+         bytes_of(heads) +
          bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) + bytes_of(patch_of) +
          bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
          bytes_of(own_point) + bytes_of(home) + bytes_of(copy_point) + bytes_of(copy_vertex) +

@@ -9,8 +9,8 @@
 //           shared ones; one that was shared stays so. Vectors are [tile][component][kGroup]. What
 //           is left of a tile is nothing, which is zero and stays so.
 // Points    of a patch: first one that is nothing, then its vertices and its hanging corners by
-//           place, then those that came with cuts. A hanging corner is the mean of four of the
-//           points (each of two counts twice on an edge).
+//           place, with gaps before long rows, then those that came with cuts. A hanging corner is
+//           the mean of four of the points (each of two counts twice on an edge).
 // Cells     in groups of kGroup, one in each lane; a lane without a cell has the point that is
 //           nothing for corners. The cells of a group are of one kind.
 //
@@ -42,6 +42,8 @@ std::size_t bytes_of(const std::vector<T, Allocator>& array) {
 /// Cells of a group and vertices of a tile: those of the widest pack.
 inline constexpr int kGroup = 16;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
+/// First points of quarters of a group, along four edges of its cells: PatchedLevel::heads.
+inline constexpr std::size_t kHeads = 16;
 /// The point of every patch that is nothing: zero, and never read.
 inline constexpr std::uint16_t kNothing = 0;
 

@@ -190,8 +190,8 @@ class StoredMatrices {
       begin_.push_back(static_cast<std::uint32_t>(size));
       if ((traits_[g] & (kNone | kTurned)) == 0) size += static_cast<std::size_t>(entries_of(g));
     }
-    plain_.resize(kGroup * plain);
-    codes_.resize(kGroup * codes);
+    make_room(plain_, kGroup * plain);
+    make_room(codes_, kGroup * codes);
     unit_.resize(codes > 0 ? kGroup * traits_.size() : 0);
   }
 
@@ -272,6 +272,17 @@ class StoredMatrices {
   }
 
  private:
+  /// How many are stored changes with the rotations. What was there is not moved along.
+  template <class T>
+  static void make_room(Array<T>& array, std::size_t size) {
+    if (size > array.capacity()) {
+      const bool is_first = array.capacity() == 0;
+      array = {};
+      array.reserve(is_first ? size : size + size / 8);
+    }
+    array.resize(size);
+  }
+
   static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4, kTurned = 8;
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
   std::size_t rotations_of(std::size_t group) const {

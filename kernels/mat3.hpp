@@ -272,9 +272,7 @@ KERF_HD Quat<T> normalised(const Quat<T>& q) {
           select(usable, q.y * scale, T(0)), select(usable, q.z * scale, T(0))};
 }
 
-/// R - I, to full relative precision however small the angle.
-///
-/// Needs  |q| = 1 up to rounding.
+/// R - I, to full relative precision however small the angle; of a longer q |q|^2 times that.
 template <class T>
 KERF_HD Mat3<T> to_matrix_less_identity(const Quat<T>& q) {
   const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;

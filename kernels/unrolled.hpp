@@ -12,7 +12,7 @@ namespace kerf::kernels {
 template <int n>
 struct Constant {
   static constexpr int value = n;
-  KERF_HD constexpr operator int() const { return n; }  // NOLINT: counters and numbers are one thing
+  KERF_HD constexpr operator int() const { return n; }  // NOLINT: a counter is a number
 };
 template <int... n>
 struct Counters {};

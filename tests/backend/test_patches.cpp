@@ -51,6 +51,7 @@ TEST(Patches, AreWholeWhenMade) {
   EXPECT_GT(hanging, 100);
   EXPECT_GT(in_rows, 800);
   EXPECT_GT(levels[0].patches.size(), 4u);
+  EXPECT_TRUE(std::any_of(levels[1].kind.begin(), levels[1].kind.end(), cpu::is_of_eight));
   EXPECT_GT(levels[0].shared, 100);
 }
 

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "cpu/element_cells.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/patched_level.hpp"
 #include "cpu/stored_matrices.hpp"
@@ -133,6 +134,43 @@ TYPED_TEST(PointsOfPacks, OfRowsAreReadAndAddedToTogether) {
     if constexpr (kLanes >= 8) expect_runs<8, S>(begins);
     if constexpr (kLanes >= 16) expect_runs<16, S>(begins);
   }
+}
+
+/// Cells with other rotations, by their numbers: [group][component][kGroup].
+template <class S>
+struct NumberedCells {
+  std::vector<S> all = std::vector<S>(4 * cpu::kGroup * 4);
+
+  NumberedCells() { std::iota(all.begin(), all.end(), S(1)); }
+  const S* rotation(std::size_t lane) const {
+    return all.data() + 4 * cpu::kGroup * (lane / cpu::kGroup) + lane % cpu::kGroup;
+  }
+};
+
+// Children of cells in a row are every other lane of two groups; others are anywhere, or absent.
+TYPED_TEST(PointsOfPacks, RotationsOfCellsAreThoseOfTheirLanes) {
+  using S = TypeParam;
+  const NumberedCells<S> cells;
+  const auto expect_lanes = [&](const auto& lane_of) {
+    std::array<std::int32_t, Pack<S>::kLanes> lanes;
+    for (int k = 0; k < Pack<S>::kLanes; ++k) lanes[k] = lane_of(k);
+    kernels::Quat<Pack<S>> q;
+    cpu::load_rotations(cells, lanes.data(), q);
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+      const S* const from = lanes[k] < 0 ? nullptr : cells.rotation(std::size_t(lanes[k]));
+      const Pack<S>* const found[] = {&q.w, &q.x, &q.y, &q.z};
+      for (int c = 0; c < 4; ++c)
+        EXPECT_EQ((*found[c])[k], from ? from[cpu::kGroup * c] : S(c == 0 ? 1 : 0))
+            << "lane " << lanes[k] << ", component " << c;
+    }
+  };
+  for (const int first : {0, 1, 2, 15, 16, 17, 32, 33})
+    expect_lanes([&](int k) { return first + 2 * k; });
+  expect_lanes([](int k) { return 7 * k % 64; });
+  expect_lanes([](int k) { return k == 0 ? -1 : 2 * k; });
+  expect_lanes([](int k) { return k % 3 == 2 ? -1 : 2 * k; });
+  expect_lanes([](int k) { return k == Pack<S>::kLanes - 1 ? 3 : 2 * k; });
+  expect_lanes([](int) { return -1; });
 }
 
 TEST(Codes, ComeBackAsTheNearestIntegers) {

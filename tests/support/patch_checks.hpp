@@ -40,7 +40,7 @@ inline void expect_all_once(const PatchedLevel& l) {
     EXPECT_EQ(l.patch_of[g], p);
     for (std::size_t edge = 0; edge < 4; ++edge)
       for (std::size_t lane = 0; lane < kGroup; lane += 4)
-        EXPECT_EQ(l.heads[16 * g + 4 * edge + lane / 4],
+        EXPECT_EQ(l.heads[cpu::kHeads * g + 4 * edge + lane / 4],
                   l.corners[8 * kGroup * g + 2 * kGroup * edge + lane]);
     for (std::size_t k = 0; k < kGroup; ++k) {
       const std::int32_t c = l.cell[kGroup * g + k];
@@ -223,6 +223,16 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
       EXPECT_EQ(octants.size(), l.level->children_of(c).size());
       EXPECT_FALSE(cpu::is_of_eight(kind) && kernels::has_hanging(l.level->fold[c]));
     }
+    bool eight = finer.children.empty() && l.held[c] == cpu::kFree &&
+                 l.level->children_of(c).size() == 8 && !kernels::has_hanging(l.level->fold[c]) &&
+                 kind != cpu::kGeneral;
+    std::set<std::pair<int, int>> kinds, places;
+    for (const std::int32_t child : l.level->children_of(c)) {
+      kinds.insert({finer.level->size_log2[child], finer.kind[finer.lane[child] / kGroup]});
+      places.insert({finer.level->place[child] % 8, 0});
+    }
+    eight = eight && kinds.size() == 1 && places.size() == 8;
+    EXPECT_EQ(cpu::is_of_eight(kind), eight) << "cell " << c;
     const bool general = kind == cpu::kGeneral || kind == cpu::kGeneralPassed;
     EXPECT_EQ(l.held[c] == cpu::kPartlyHeld || general, cpu::is_held(kind));
     if (general) continue;
