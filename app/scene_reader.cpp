@@ -284,6 +284,7 @@ void read_solver(SceneTable& table, SolverSetup& solver) {
       sweeps->fail("must not both be 0: the cycle would not smooth");
   }
   table.read("omega", solver.omega, {0, 2, true, "greater than 0 and less than 2"});
+  table.read("degree", solver.degree, 1, kMaxDegree);
   table.read("tolerance", solver.tolerance, {0, 1, true, "greater than 0 and less than 1"});
   table.read("cycles", solver.cycles, 0);
   table.read("max_cycles", solver.max_cycles, 1);

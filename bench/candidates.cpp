@@ -16,6 +16,14 @@ SolverSetup paper_solver() {
   return out;
 }
 
+// As many products a cycle as Gauss-Seidel V(1,1) has sweeps and residuals; the default, of
+// degree 2, is a V(2,2) in this count.
+SolverSetup damped_jacobi() {
+  SolverSetup out;
+  out.degree = 1;
+  return out;
+}
+
 SolverSetup by_method(SolverMethod method) {
   SolverSetup out;
   out.method = method;
@@ -37,6 +45,11 @@ const std::vector<Candidate>& candidates() {
        "reference",
        {},
        {}},
+      {"cpu-degree1",
+       "the CPU backend with one step of damped Jacobi a sweep: V(1,1) as [DGW11] counts",
+       "cpu",
+       damped_jacobi(),
+       {"smooth-chebyshev", "cycle", "solve", "step"}},
       {"cuda", "the CUDA backend with its defaults", "cuda", {}, {}},
       {"dense24", "a plain 24x24 product for each cell", "reference", {}, {"operator"}},
       {"paper",

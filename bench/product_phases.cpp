@@ -68,6 +68,11 @@ Outcome outcome_cycle(Trial& t) {
   return out;
 }
 
+Work work_cycle(const Trial& t) {
+  if (t.is_paper()) return counts::kCyclePaper;
+  return t.is_jacobi() ? counts::kCycleJacobi : counts::kCycle;
+}
+
 // transfer
 
 void prepare_prolong(Trial& t) {
@@ -84,10 +89,10 @@ std::vector<Phase> product_phases() {
       {"residual", "f - A u and its norm, level 0", prepare_residual,
        [](Trial& t) { t.number = t.backend().residual(0); },
        [](Trial& t) { return vector_of(t, 0, kResidual); }, always(counts::kResidual)},
-      {"smooth-chebyshev", "one sweep of degree 2, level 0",
+      {"smooth-chebyshev", "one sweep of degree 2 (cpu-degree1: 1), level 0",
        [](Trial& t) { prepare_smooth(t, SmootherType::chebyshev); },
        [](Trial& t) { t.backend().smooth(0, SweepOrder::forward, 1); }, outcome_smooth,
-       always(counts::kChebyshev)},
+       [](const Trial& t) { return t.is_jacobi() ? counts::kDampedStep : counts::kChebyshev; }},
       {"smooth-gauss-seidel", "one sweep over all colours, level 0",
        [](Trial& t) { prepare_smooth(t, SmootherType::gauss_seidel); },
        [](Trial& t) { t.backend().smooth(0, SweepOrder::forward, 1); }, outcome_smooth,
@@ -102,8 +107,7 @@ std::vector<Phase> product_phases() {
       {"coarsest", "solution on the coarsest level", prepare_coarsest,
        [](Trial& t) { t.backend().solve_coarsest(); }, outcome_coarsest, always({})},
       {"cycle", "one cycle from zero", prepare_cycle, [](Trial& t) { t.cycle().run(); },
-       outcome_cycle,
-       [](const Trial& t) { return t.is_paper() ? counts::kCyclePaper : counts::kCycle; }, 2},
+       outcome_cycle, work_cycle, 2},
   };
 }
 

@@ -44,9 +44,8 @@ void Trial::drop() {
 }
 
 void Trial::use_smoother(SmootherType type) {
-  SmootherOptions options;
+  SmootherOptions options = smoother_options(candidate.solver);
   options.chebyshev = type == SmootherType::chebyshev;
-  options.omega = candidate.solver.omega;
   backend().set_smoother(options);
 }
 

@@ -78,6 +78,7 @@ struct Trial {
   /// Values of one level of the backend.
   std::vector<double> read(int level, int x);
   bool is_paper() const { return candidate.solver.method == SolverMethod::multigrid; }
+  bool is_jacobi() const { return candidate.solver.degree == 1; }
 };
 
 }  // namespace kerf::bench

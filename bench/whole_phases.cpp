@@ -134,7 +134,8 @@ Work work_solve(const Trial& t) {
   const auto cycles = static_cast<double>(t.stats.cycles);
   switch (t.candidate.solver.method) {
     case SolverMethod::cg:
-      return kCoarsen + kPrepare + cycles * (kCycle + kOperator + kIteration);
+      return kCoarsen + kPrepare +
+             cycles * ((t.is_jacobi() ? kCycleJacobi : kCycle) + kOperator + kIteration);
     case SolverMethod::multigrid:
       return kCoarsenPaper + kPrepare + cycles * (kCyclePaper + kResidual);
     case SolverMethod::cg_jacobi:
@@ -191,6 +192,11 @@ Outcome outcome_step(Trial& t) {
   return out;
 }
 
+Work work_step(const Trial& t) {
+  if (t.is_paper()) return counts::kStepPaper;
+  return t.is_jacobi() ? counts::kStepJacobi : counts::kStep;
+}
+
 }  // namespace
 
 std::vector<Phase> whole_phases() {
@@ -204,8 +210,7 @@ std::vector<Phase> whole_phases() {
       {"solve", "values and linear solution to a true relative residual of 1e-8", prepare_solve,
        run_solve, outcome_solve, work_solve},
       {"step", "rotations, matrices and diagonals, three cycles", prepare_step, run_step,
-       outcome_step,
-       [](const Trial& t) { return t.is_paper() ? counts::kStepPaper : counts::kStep; }, 2},
+       outcome_step, work_step, 2},
   };
 }
 

@@ -126,7 +126,13 @@ class Backend {
   // The cycle.
   virtual void smooth(int level, SweepOrder order, int count) = 0;  ///< u from f
   virtual double residual(int level) = 0;                           ///< r = f - A u; returns |r|
-  virtual void restrict_residual(int fine) = 0;        ///< f of fine + 1 = P^T r; its u = 0
+  virtual void restrict_residual(int fine) = 0;  ///< f of fine + 1 = P^T r; its u = 0
+  /// Both at once, where that costs less: f of fine + 1 = P^T (f - A u), its u = 0. What r of
+  /// `fine` holds then is not defined.
+  virtual void restrict_from_solution(int fine) {
+    residual(fine);
+    restrict_residual(fine);
+  }
   virtual void prolong_correction(int fine) = 0;       ///< u of fine += P u of fine + 1
   virtual void solve_coarsest() = 0;                   ///< u from f
   virtual void apply(int level, int in, int out) = 0;  ///< out = A in

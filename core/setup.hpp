@@ -87,12 +87,16 @@ enum class CycleType { automatic, v, w, k };
 enum class SmootherType { chebyshev, gauss_seidel };
 enum class Precision { double_, mixed, single };
 
+/// Of Chebyshev: sweeps of more steps gain nothing (docs/decisions/0018-runs.md).
+inline constexpr int kMaxDegree = 8;
+
 struct SolverSetup {
   SolverMethod method = SolverMethod::cg;
   CycleType cycle = CycleType::automatic;
   SmootherType smoother = SmootherType::chebyshev;
   int pre_sweeps = 1, post_sweeps = 1;
   double omega = 1.0;  ///< over-relaxation of Gauss-Seidel, in (0, 2)
+  int degree = 2;      ///< of Chebyshev: steps in one sweep, 1 (damped Jacobi) to kMaxDegree
   /// True residual after the last linear solve of a time step, relative to that before the step;
   /// the solves before it stop at a tenth of what they start from, or where the
   /// rotations undo the rest (docs/decisions/0016-early-updates.md). In static mode each solve

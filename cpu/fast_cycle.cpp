@@ -133,35 +133,81 @@ void FastBackend<S>::chebyshev(int level) {
 template <class S>
 void FastBackend<S>::restrict_residual(int fine) {
   settle();
+  restrict_vector(fine, kResidual);
+}
+
+template <class S>
+void FastBackend<S>::restrict_vector(int fine, int x) {
   FastLevel<S>& from = levels_[fine];
-  FastLevel<S>& to = levels_[fine + 1];
-  const Transfer& transfer = from.patched.transfer;
-  const S* r = from.at(kResidual);
-  S* f = to.at(kRight);
-  S* const given = partial_sums<S>(4 * transfer.point.size());
-  const auto patches = static_cast<std::int32_t>(from.patched.patches.size());
-  ParallelErrors errors;
-#pragma omp parallel num_threads(threads_) if (from.patched.cell.size() >= kWorthCells)
-  {
-#pragma omp for schedule(dynamic, 1)
-    for (std::int32_t p = 0; p < patches; ++p)
-      errors.run(
-          [&] { TransferPoints<S>(from.patched, static_cast<std::size_t>(p)).give(r, given); });
-#pragma omp for schedule(static)
-    for (std::int32_t t = 0; t < to.tiles(); ++t) {
-      const auto tile = static_cast<std::size_t>(t);
-      for_packs<S>([&](int first) {
-        alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};
-        for (int k = 0; k < Pack<S>::kLanes; ++k)
-          if (const std::int32_t v = to.patched.vertex[kGroup * tile + std::size_t(first + k)];
-              v >= 0)
-            sum_records<S>(transfer.givers_of(v), given, sums + 4 * k);
-        store_tile(f, tile, first,
-                   masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first)));
+  const S* r = from.at(x);
+  S* const given = partial_sums<S>(4 * from.patched.transfer.point.size());
+  for_patches_of(fine, [&](std::size_t patch) {
+    TransferPoints<S> points(from.patched, patch);
+    points.clear(given);
+    points.give_own(r, given);
+    points.give_leads(r, given);
+  });
+  sum_given(fine, given);
+}
+
+// What own vertices have left goes to the next level while it is in registers, and to no vector;
+// that of shared ones has to wait for all patches. In the order of restrict_residual: the same
+// bits.
+template <class S>
+void FastBackend<S>::restrict_from_solution(int fine) {
+  settle();
+  FastLevel<S>& l = levels_[fine];
+  if (l.solution_is_zero) return restrict_vector(fine, kRight);
+  const S* f = l.at(kRight);
+  const S* u = l.at(kSolution);
+  S* r = l.at(kResidual);
+  const std::size_t copies = 4 * l.patched.copy_point.size();
+  S* const given = partial_sums<S>(copies + 4 * l.patched.transfer.point.size()) + copies;
+  const auto left = [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum) {
+    return load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
+  };
+  sweep<S>(
+      fine, kNothingBefore,
+      [&](std::size_t patch) {
+        auto& points = transfer_here<S>();
+        points.emplace(l.patched, patch);
+        points->clear(given);
+      },
+      [&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u,
+      [&](std::size_t group, const S* x, S* y) { add_products(fine, group, x, y); },
+      [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
+        transfer_here<S>()->give_tile(tile, first, left(tile, first, sum), given);
+        return Sums{};
+      },
+      [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
+        store_tile(r, tile, first, left(tile, first, sum));
+        return Sums{};
       });
-    }
+  for_patches_of(
+      fine, [&](std::size_t patch) { TransferPoints<S>(l.patched, patch).give_leads(r, given); });
+  sum_given(fine, given);
+}
+
+/// The right-hand side of the next level, from what patches of `fine` give to its points.
+template <class S>
+void FastBackend<S>::sum_given(int fine, const S* given) {
+  FastLevel<S>& to = levels_[fine + 1];
+  const Transfer& transfer = levels_[fine].patched.transfer;
+  S* f = to.at(kRight);
+  const bool is_worth = levels_[fine].patched.cell.size() >= kWorthCells;
+#pragma omp parallel for num_threads(threads_) schedule(static) if (is_worth)
+  for (std::int32_t t = 0; t < to.tiles(); ++t) {
+    const auto tile = static_cast<std::size_t>(t);
+    for_packs<S>([&](int first) {
+      alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};
+      for (int k = 0; k < Pack<S>::kLanes; ++k)
+        if (const std::int32_t v = to.patched.vertex[kGroup * tile + std::size_t(first + k)];
+            v >= 0)
+          sum_records<S>(transfer.givers_of(v), given, sums + 4 * k);
+      store_tile(f, tile, first,
+                 masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first)));
+    });
   }
-  errors.rethrow();
   zero(fine + 1, kSolution);
 }
 
@@ -172,9 +218,8 @@ void FastBackend<S>::correct_shared(int level) {
   FastLevel<S>& next = levels_[level + 1];
   const S* from = next.at(kSolution);
   S* to = l.at(kSolution);
-  const int threads = l.patched.cell.size() >= kWorthCells ? threads_ : 1;
-  for_patches(0, static_cast<std::int32_t>(l.patched.patches.size()), threads, [&](std::int32_t p) {
-    TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
+  for_patches_of(level, [&](std::size_t patch) {
+    TransferPoints<S> points(l.patched, patch);
     points.load(next.patched, from);
     points.add_to_leads(to);
   });

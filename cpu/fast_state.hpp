@@ -108,6 +108,8 @@ struct FastLevel {
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
+  /// Not 0: the solution of own vertices is this times D^-1 f, and not in its vector yet.
+  S first_step = 0;
 
   std::int32_t tiles() const { return static_cast<std::int32_t>(patched.tiles()); }
   std::int32_t scalars() const { return 3 * kGroup * tiles(); }
@@ -124,6 +126,10 @@ struct FastLevel {
     const Pack<S> xy = entry(1), xz = entry(2), yz = entry(4);
     return {fma(entry(0), r.x, fma(xy, r.y, xz * r.z)), fma(xy, r.x, fma(entry(3), r.y, yz * r.z)),
             fma(xz, r.x, fma(yz, r.y, entry(5) * r.z))};
+  }
+  /// A step of Jacobi from zero.
+  Vec3<Pack<S>> from_zero(S step, std::size_t tile, int first) {
+    return Pack<S>(step) * times_inverse(tile, first, load_tile(std::as_const(*this).at(kRight), tile, first));
   }
 };
 
@@ -169,6 +175,7 @@ class FastBackend final : public Backend {
   void smooth(int level, SweepOrder order, int count) override;
   double residual(int level) override;
   void restrict_residual(int fine) override;
+  void restrict_from_solution(int fine) override;
   void prolong_correction(int fine) override;
   void solve_coarsest() override;
   void apply(int level, int in, int out) override;
@@ -215,6 +222,14 @@ class FastBackend final : public Backend {
 #pragma omp parallel for num_threads(threads_) schedule(static) if (end - begin >= kWorthTiles)
     for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
   }
+  /// body(patch), for the patches of a level.
+  template <class Body>
+  void for_patches_of(int level, const Body& body) const {
+    const PatchedLevel& l = levels_[level].patched;
+    for_patches(0, static_cast<std::int32_t>(l.patches.size()),
+                l.cell.size() >= kWorthCells ? threads_ : 1,
+                [&](std::int32_t p) { body(static_cast<std::size_t>(p)); });
+  }
   static constexpr std::int32_t kWorthGroups = 4;  // whose matrices are made
   static constexpr std::int32_t kWorthTiles = 256;
   static constexpr std::size_t kWorthCells = 2048;  // below, waking the threads costs more
@@ -231,7 +246,13 @@ class FastBackend final : public Backend {
   T* partial_sums(std::size_t scalars);
   template <class T, class From, class Before, class Start, class Own, class Cells, class Finish>
   Sums sweep(int level, const Before& before, const Start& start, const Own& own, const From* u,
-             const Cells& cells, const Finish& finish);
+             const Cells& cells, const Finish& finish) {
+    return sweep<T>(level, before, start, own, u, cells, finish, finish);
+  }
+  template <class T, class From, class Before, class Start, class Own, class Cells, class Finish,
+            class FinishShared>
+  Sums sweep(int level, const Before& before, const Start& start, const Own& own, const From* u,
+             const Cells& cells, const Finish& finish, const FinishShared& finish_shared);
   template <class T>
   void add_products(int level, std::size_t group, const T* x, T* y) const;
   template <class T>
@@ -275,6 +296,8 @@ class FastBackend final : public Backend {
   template <class Value>
   void chebyshev_step(int level, const Value& value, double step, bool put);
   void chebyshev(int level);
+  void restrict_vector(int fine, int x);
+  void sum_given(int fine, const S* given);
   void correct_shared(int level);
   void settle();
   void expects_exact(int in, int out) const {
@@ -327,13 +350,15 @@ T* FastBackend<S>::partial_sums(std::size_t scalars) {
 /// One pass over the cells of a level, from the vector u to what finish makes of the sums; u may be
 /// of another precision than the arithmetic, T.
 /// before(tile): shared tiles, first of all, in any order. start(patch): before what is asked of a
-/// patch, on the same thread. own, cells, finish: see PatchPoints; cells gets (group, x, y). finish
-/// of a shared tile reads x from u. Returns the sum of what finish
-/// returns, in an order that threads do not change.
+/// patch, on the same thread. own, cells, finish: see PatchPoints; cells gets (group, x, y).
+/// finish_shared: of shared tiles, behind all others, on any thread; its x is read from u. Returns
+/// the sum of what these return, in an order that threads do not change.
 template <class S>
-template <class T, class From, class Before, class Start, class Own, class Cells, class Finish>
+template <class T, class From, class Before, class Start, class Own, class Cells, class Finish,
+          class FinishShared>
 Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, const Own& own,
-                           const From* u, const Cells& cells, const Finish& finish) {
+                           const From* u, const Cells& cells, const Finish& finish,
+                           const FinishShared& finish_shared) {
   const PatchedLevel& l = levels_[level].patched;
   const auto patches = static_cast<std::int32_t>(l.patches.size());
   const auto shared = static_cast<std::int32_t>(l.shared_tiles.size());
@@ -360,8 +385,8 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
       const auto tile = static_cast<std::size_t>(l.shared_tiles[n]);
       Sums sum;
       for_packs<T>([&](int first) {
-        sum += finish(tile, first, shared_sums(l, n, first, partial),
-                      [&] { return load_tile_as<T>(u, tile, first); });
+        sum += finish_shared(tile, first, shared_sums(l, n, first, partial),
+                             [&] { return load_tile_as<T>(u, tile, first); });
       });
       sums[l.patches.size() + static_cast<std::size_t>(n)] = sum;
     }

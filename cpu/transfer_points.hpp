@@ -63,30 +63,39 @@ class TransferPoints {
     });
   }
 
-  /// The other way: what the vertices give to the points, from a vector, by point.
-  void give(const S* r, S* out) {
-    S* const to = out + 4 * static_cast<std::size_t>(part_.points.first);
-    std::fill_n(to, 4 * static_cast<std::size_t>(part_.points.size), S(0));
-    for (std::int32_t v = own_.first; v < own_.end(); v += kGroup) {
-      const auto tile = static_cast<std::size_t>(v / kGroup);
-      for_packs<S>([&](int first) {
-        for_records(load_tile(r, tile, first), [&](int lane, const R& record) {
-          __builtin_memcpy(rows_ + 4 * (first + lane), &record, sizeof record);
-        });
-      });
-      give(transfer_.tiles[tile], transfer_.terms.data() + v, kGroup, to);
+  // The other way: what vertices give to the points, by point, in `out`: first of all clear, own
+  // vertices next, leads last.
+
+  void clear(S* out) const {
+    std::fill_n(given_to(out), 4 * static_cast<std::size_t>(part_.points.size), S(0));
+  }
+  /// r: of the own vertices of a tile, of the lanes from `first` on; of a tile in their order.
+  void give_tile(std::size_t tile, int first, const kernels::Vec3<Pack<S>>& r, S* out) {
+    for_records(r, [&](int lane, const R& record) {
+      __builtin_memcpy(rows_ + 4 * (first + lane), &record, sizeof record);
+    });
+    if (first + Pack<S>::kLanes == kGroup)
+      give(transfer_.tiles[tile], transfer_.terms.data() + kGroup * tile, kGroup, given_to(out));
+  }
+  void give_own(const S* r, S* out) {
+    for (std::int32_t t = own_.first / kGroup; t < own_.end() / kGroup; ++t) {
+      const auto tile = static_cast<std::size_t>(t);
+      for_packs<S>([&](int first) { give_tile(tile, first, load_tile(r, tile, first), out); });
     }
+  }
+  void give_leads(const S* r, S* out) {
     for_lead_blocks([&](const TransferBlock& block, std::int32_t first, int count) {
       S* row = rows_;
       for (int k = 0; k < count; ++k, row += 4) {
         const S* from = r + scalar_of(transfer_.lead[first + k]);
         row[0] = from[0], row[1] = from[kGroup], row[2] = from[2 * kGroup], row[3] = 0;
       }
-      give(block, transfer_.lead_terms.data() + first, count, to);
+      give(block, transfer_.lead_terms.data() + first, count, given_to(out));
     });
   }
 
  private:
+  S* given_to(S* out) const { return out + 4 * static_cast<std::size_t>(part_.points.first); }
   static void read(const S* x, std::size_t n, R& out) {
     __builtin_memcpy(&out, x + 4 * n, sizeof out);
   }

@@ -33,14 +33,21 @@ CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy)
   return options;
 }
 
+SmootherOptions smoother_options(const SolverSetup& setup) {
+  SmootherOptions options;
+  options.chebyshev = setup.smoother == SmootherType::chebyshev;
+  options.omega = setup.omega;
+  options.degree = setup.degree;
+  return options;
+}
+
 void Cycle::descend(int level) {
   if (level == coarsest_) {
     backend_.solve_coarsest();
     return;
   }
   backend_.smooth(level, SweepOrder::forward, options_.pre_sweeps);
-  backend_.residual(level);
-  backend_.restrict_residual(level);
+  backend_.restrict_from_solution(level);
   solve_coarse(level + 1);
   backend_.prolong_correction(level);
   backend_.smooth(level, options_.symmetric ? SweepOrder::backward : SweepOrder::forward,

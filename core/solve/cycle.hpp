@@ -28,6 +28,8 @@ struct CycleOptions {
 /// cells are too stiff in bending, and K-cycles repair it; on uncut ones V costs less.
 CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy);
 
+SmootherOptions smoother_options(const SolverSetup& setup);
+
 class Cycle {
  public:
   Cycle(Backend& backend, int levels, CycleOptions options)

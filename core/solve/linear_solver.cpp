@@ -16,10 +16,7 @@ LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
       vectors_(backend.conjugate_vectors()),
       spare_{vectors_.rounded ? backend.add_vector() : vectors_.direction,
              vectors_.rounded ? backend.add_vector() : vectors_.product} {
-  SmootherOptions smoother;
-  smoother.chebyshev = setup.smoother == SmootherType::chebyshev;
-  smoother.omega = setup.omega;
-  backend_.set_smoother(smoother);
+  backend_.set_smoother(smoother_options(setup));
 }
 
 void LinearSolver::release() {

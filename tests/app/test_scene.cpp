@@ -109,6 +109,7 @@ cycle = "K"
 smoother = "gauss-seidel"
 sweeps = [2, 3]
 omega = 1.5
+degree = 3
 tolerance = 1e-7
 cycles = 3
 max_cycles = 77
@@ -167,6 +168,7 @@ preview = false
   EXPECT_EQ(s.solver.pre_sweeps, 2);
   EXPECT_EQ(s.solver.post_sweeps, 3);
   EXPECT_EQ(s.solver.omega, 1.5);
+  EXPECT_EQ(s.solver.degree, 3);
   EXPECT_EQ(s.solver.tolerance, 1e-7);
   EXPECT_EQ(s.solver.cycles, 3);
   EXPECT_EQ(s.solver.max_cycles, 77);
@@ -270,6 +272,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"ModeUnknown", "[time]\nmode = \"quick\"\n", {":6: ", "dynamic", "static"}},
         BadScene{"OmegaTwo", "[solver]\nomega = 2\n", {":6: ", "less than 2"}},
         BadScene{"OmegaZero", "[solver]\nomega = 0\n", {":6: ", "greater than 0"}},
+        BadScene{"DegreeZero", "[solver]\ndegree = 0\n", {":6: ", "1"}},
+        BadScene{"DegreeNine", "[solver]\ndegree = 9\n", {":6: ", "8"}},
         BadScene{"SweepsNegative", "[solver]\nsweeps = [1, -1]\n", {":6: ", "at least 0"}},
         BadScene{"SweepsNone", "[solver]\nsweeps = [0, 0]\n", {":6: ", "smooth"}},
         BadScene{"ToleranceOne", "[solver]\ntolerance = 1\n", {":6: ", "less than 1"}},

@@ -73,8 +73,7 @@ void expect_operators_alike(const Problem& p, const Backend& finest, const Backe
       test::write(*backend, l, kRight, f);
       backend->zero(l, kSolution);
       backend->smooth(l, SweepOrder::forward, 2);
-      backend->residual(l);
-      backend->restrict_residual(l);
+      backend->restrict_from_solution(l);
     }
     EXPECT_LE(relative(p.read(mixed, l, kSolution), p.read(exact, l, kSolution)),
               l == 0 ? kSmoothed : kCodedSmoothed);

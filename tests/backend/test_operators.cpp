@@ -269,6 +269,39 @@ TEST_P(Operators, GaussSeidelIsASequentialSweepInTheOrderOfColours) {
   }
 }
 
+// From zero, from a solution, and with a correction that a backend may still owe to it.
+TEST_P(Operators, RestrictionFromTheSolutionIsThatOfItsResidual) {
+  const Problem p(scene());
+  const auto A = test::matrices_of(p, kDynamic, p.deformation());
+  const Loaded loaded = load(p, tiles_of(machine()).back(), kDynamic);
+  Backend& backend = *loaded.backend;
+  for (int l = 0; l + 1 < p.levels(); ++l) {
+    const Sparse P = oracle::masked(oracle::prolongation_matrix(p.grids[l], p.grids[l + 1]),
+                                    p.fixed(l), p.fixed(l + 1));
+    const Vector f = p.free_vector(l, 61), u = 1e-3 * p.free_vector(l, 62),
+                 e = 1e-3 * p.free_vector(l + 1, 63);
+    test::write(backend, l, kRight, f);
+    for (const int start : {0, 1, 2}) {
+      SCOPED_TRACE(::testing::Message() << "level " << l << ", start " << start);
+      Vector r = f;
+      backend.zero(l, kSolution);
+      if (start > 0) test::write(backend, l, kSolution, u), r -= A[l] * u;
+      if (start > 1) {
+        test::write(backend, l + 1, kSolution, e);
+        backend.prolong_correction(l);
+        r -= A[l] * (P * e);
+      }
+      backend.restrict_from_solution(l);
+      const Vector once = p.read(backend, l + 1, kRight);
+      expect_close(once, P.transpose() * r, "restrict_from_solution", 10 * kRelative);
+      EXPECT_EQ(p.read(backend, l + 1, kSolution).norm(), 0);
+      backend.residual(l);
+      backend.restrict_residual(l);
+      EXPECT_EQ(p.read(backend, l + 1, kRight), once);
+    }
+  }
+}
+
 TEST_P(Operators, ChebyshevIsTheLeastPolynomial) {
   const Problem p(scene());
   const auto A = test::matrices_of(p, kDynamic, p.deformation());

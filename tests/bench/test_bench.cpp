@@ -88,12 +88,15 @@ TEST(Bench, BaselinesFindTheSameResults) {
 
   std::map<std::string, double> residual;
   for (const Row& row : bench.rows) residual[row.phase + "/" + row.backend] = row.residual;
-  EXPECT_EQ(residual.size(), 11u);
+  EXPECT_EQ(residual.size(), 13u);
   EXPECT_LE(residual.at("operator/dense24"), kRounding);
   EXPECT_LE(residual.at("operator/reference"), kRounding);
-  for (const char* name : {"solve/cpu", "solve/paper", "solve/cg-jacobi", "solve/cholesky"})
+  for (const char* name :
+       {"solve/cpu", "solve/cpu-degree1", "solve/paper", "solve/cg-jacobi", "solve/cholesky"})
     EXPECT_LE(residual.at(name), 1e-8) << name;
+  EXPECT_LT(residual.at("step/cpu"), residual.at("step/cpu-degree1"));
   EXPECT_LT(residual.at("step/cpu"), residual.at("step/paper"));
+  EXPECT_LT(residual.at("step/cpu-degree1"), 0.0145);  // the cube of [DGW11], table 2
 }
 
 TEST(Bench, HashesDoNotDependOnThreads) {
@@ -201,9 +204,10 @@ TEST(BenchOptions, UnknownNamesNameTheNearest) {
   EXPECT_EQ(refusal({"--scene", "box64", "--phase", "operater"}),
             "--phase: no phase 'operater'; did you mean 'operator'?");
   EXPECT_EQ(refusal({"--secne", "box64"}), "no option '--secne'; did you mean '--scene'?");
-  EXPECT_EQ(refusal({"--scene", "box64", "--backend", "opencl"}),
-            "--backend: no backend 'opencl'; there are: cpu, reference, cuda, dense24, paper, "
-            "cg-jacobi, cholesky");
+  EXPECT_EQ(
+      refusal({"--scene", "box64", "--backend", "opencl"}),
+      "--backend: no backend 'opencl'; there are: cpu, reference, cpu-degree1, cuda, dense24, "
+      "paper, cg-jacobi, cholesky");
 }
 
 TEST(BenchOptions, ValuesAreChecked) {

@@ -113,6 +113,8 @@ TEST(Validate, NamesWhatMakesNoSense) {
       {"time.duration", [](auto& s) { s.time.duration = -1; }},
       {"steps", [](auto& s) { s.time.step = 1e-12; }},
       {"solver.omega", [](auto& s) { s.solver.omega = 2; }},
+      {"solver.degree", [](auto& s) { s.solver.degree = 0; }},
+      {"solver.degree", [](auto& s) { s.solver.degree = 9; }},
       {"solver.sweeps", [](auto& s) { s.solver.pre_sweeps = s.solver.post_sweeps = 0; }},
       {"solver.tolerance", [](auto& s) { s.solver.tolerance = 1; }},
       {"support",
