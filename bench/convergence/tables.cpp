@@ -78,6 +78,9 @@ std::vector<Case> cube(Size size) {
                         size_of(body) + ", V(1,1) Gauss-Seidel"));
     out.push_back(named(with(body, CycleType::v, SmootherType::chebyshev),
                         size_of(body) + ", V(1,1) Chebyshev 2"));
+    out.push_back(named(with(body, CycleType::v, SmootherType::chebyshev),
+                        size_of(body) + ", V(1,1) Chebyshev 1"));
+    out.back().setup.solver.degree = 1;
   }
   return out;
 }
@@ -232,7 +235,7 @@ Record run_case(const Table& table, const Case& one, int threads) {
   out.cycle = name_of(cycle.type);
   if (cycle.type == CycleType::k && cycle.first_twice > 1)
     out.cycle = text(out.cycle, " from level ", cycle.first_twice);
-  out.smoother = relaxes ? "Gauss-Seidel" : "Chebyshev";
+  out.smoother = relaxes ? "Gauss-Seidel" : setup.solver.degree == 1 ? "Chebyshev 1" : "Chebyshev";
   out.sweeps = is_alone ? "forward" : "symmetric";
   out.omega = relaxes ? setup.solver.omega : kNone;
   out.poisson = setup.poisson;

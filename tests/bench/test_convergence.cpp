@@ -51,6 +51,18 @@ TEST(ConvergenceCube, ChebyshevBeatsGaussSeidel) {
   EXPECT_EQ(relaxed.omega, 1);
 }
 
+// Damped Jacobi: more cycles than with two steps a sweep, at most twice as many.
+TEST(ConvergenceCube, DegreeOneLiesBetween) {
+  const Record one = run("cube", "16^3, V(1,1) Chebyshev 1");
+  const Record two = run("cube", "16^3, V(1,1) Chebyshev 2");
+
+  EXPECT_EQ(one.smoother, "Chebyshev 1");
+  EXPECT_GT(one.factor, two.factor);
+  EXPECT_LT(one.factor, 0.7);
+  EXPECT_GT(one.cg_1e10, two.cg_1e10);
+  EXPECT_LE(one.cg_1e10, 2 * two.cg_1e10);
+}
+
 // K-cycles keep the factor of two levels, V-cycles lose some. A hundredth: what the last cycles of
 // a factor differ by.
 TEST(ConvergenceDepth, KIsNoWorseThanVAndDoesNotGrow) {
@@ -78,7 +90,8 @@ TEST(ConvergencePoisson, TheFactorGrowsTowardsIncompressible) {
   }
 }
 
-// A mass term adds about the same to all eigenvalues, so that nothing is left for coarse levels to do.
+// A mass term adds about the same to all eigenvalues, so that nothing is left for coarse levels to
+// do.
 TEST(ConvergenceMass, HeavierIsFaster) {
   for (const char* solver : {"default, ", "V, "}) {
     const Record heavy = run("mass", std::string(solver) + "0.1");
