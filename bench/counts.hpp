@@ -46,7 +46,7 @@ inline constexpr Work kChebyshev = 2 * kDampedStep;
 inline constexpr Work kGaussSeidel{1412, 272, 416};
 /// V(1,1) with Chebyshev of degree 2: level 1 without stored matrices, 231 scalars a cell beyond.
 inline constexpr Work kCycle{2785, 370, 596};
-/// The same with damped Jacobi: three products a cycle instead of five.
+/// The same with damped Jacobi, a step before and a step after.
 inline constexpr Work kCycleJacobi{1571, 208, 335};
 /// V(1,1) with Gauss-Seidel, 576 scalars a cell on all coarse levels.
 inline constexpr Work kCyclePaper{4541, 1665, 3059};
@@ -75,11 +75,6 @@ inline constexpr Work kJacobi{15, 48, 96};
 /// Beside product and preconditioner, one iteration of conjugate gradients: three scalar products
 /// and three sums, each vector once.
 inline constexpr Work kIteration{27, 84, 168};
-
-/// Rotations, coarse matrices, diagonals, three cycles.
-inline constexpr Work kStep = kRotate + kCoarsen + kPrepare + 3 * kCycle;
-inline constexpr Work kStepJacobi = kRotate + kCoarsen + kPrepare + 3 * kCycleJacobi;
-inline constexpr Work kStepPaper = kRotate + kCoarsenPaper + kPrepare + 3 * kCyclePaper;
 
 }  // namespace counts
 }  // namespace kerf::bench

@@ -42,6 +42,9 @@ std::vector<Phase> product_phases();  ///< products with A, and transfer between
 std::vector<Phase> value_phases();    ///< what follows the rotations, and single vectors
 std::vector<Phase> whole_phases();    ///< larger parts of a run
 
+/// Of one cycle of the candidate.
+Work work_cycle(const Trial& t);
+
 inline std::function<Work(const Trial&)> always(const Work& work) {
   return [work](const Trial&) { return work; };
 }

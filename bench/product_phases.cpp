@@ -68,11 +68,6 @@ Outcome outcome_cycle(Trial& t) {
   return out;
 }
 
-Work work_cycle(const Trial& t) {
-  if (t.is_paper()) return counts::kCyclePaper;
-  return t.is_jacobi() ? counts::kCycleJacobi : counts::kCycle;
-}
-
 // transfer
 
 void prepare_prolong(Trial& t) {
@@ -81,6 +76,11 @@ void prepare_prolong(Trial& t) {
 }
 
 }  // namespace
+
+Work work_cycle(const Trial& t) {
+  if (t.is_paper()) return counts::kCyclePaper;
+  return t.is_jacobi() ? counts::kCycleJacobi : counts::kCycle;
+}
 
 std::vector<Phase> product_phases() {
   return {

@@ -134,10 +134,9 @@ Work work_solve(const Trial& t) {
   const auto cycles = static_cast<double>(t.stats.cycles);
   switch (t.candidate.solver.method) {
     case SolverMethod::cg:
-      return kCoarsen + kPrepare +
-             cycles * ((t.is_jacobi() ? kCycleJacobi : kCycle) + kOperator + kIteration);
+      return kCoarsen + kPrepare + cycles * (work_cycle(t) + kOperator + kIteration);
     case SolverMethod::multigrid:
-      return kCoarsenPaper + kPrepare + cycles * (kCyclePaper + kResidual);
+      return kCoarsenPaper + kPrepare + cycles * (work_cycle(t) + kResidual);
     case SolverMethod::cg_jacobi:
       return kPrepare + cycles * (kJacobi + kOperator + kIteration);
     case SolverMethod::cholesky:
@@ -193,8 +192,8 @@ Outcome outcome_step(Trial& t) {
 }
 
 Work work_step(const Trial& t) {
-  if (t.is_paper()) return counts::kStepPaper;
-  return t.is_jacobi() ? counts::kStepJacobi : counts::kStep;
+  using namespace counts;
+  return kRotate + (t.is_paper() ? kCoarsenPaper : kCoarsen) + kPrepare + 3 * work_cycle(t);
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ void validate(const SimulationSetup& setup) {
   const SolverSetup& solver = setup.solver;
   expects(solver.omega > 0 && solver.omega < 2, "solver.omega must lie between 0 and 2");
   expects(solver.degree >= 1 && solver.degree <= kMaxDegree,
-          "solver.degree must lie between 1 and 8");
+          text("solver.degree must lie between 1 and ", kMaxDegree));
   expects(solver.pre_sweeps >= 0 && solver.post_sweeps >= 0 &&
               solver.pre_sweeps + solver.post_sweeps > 0,
           "solver.sweeps must not be negative, and one of them positive");

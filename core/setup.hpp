@@ -87,7 +87,8 @@ enum class CycleType { automatic, v, w, k };
 enum class SmootherType { chebyshev, gauss_seidel };
 enum class Precision { double_, mixed, single };
 
-/// Of Chebyshev: sweeps of more steps gain nothing (docs/decisions/0018-runs.md).
+/// Of Chebyshev: far beyond what pays; 3 steps a sweep gain hardly anything already
+/// (docs/decisions/0018-runs.md).
 inline constexpr int kMaxDegree = 8;
 
 struct SolverSetup {

@@ -236,26 +236,26 @@ void FastBackend<S>::prolong_correction(int fine) {
 template <class S>
 void FastBackend<S>::settle() {
   if (waiting_ < 0) return;
-  FastLevel<S>& l = levels_[waiting_];
-  FastLevel<S>& next = levels_[waiting_ + 1];
-  correct_shared(waiting_);
+  const int level = waiting_;
+  FastLevel<S>& l = levels_[level];
+  FastLevel<S>& next = levels_[level + 1];
+  correct_shared(level);
   waiting_ = -1;
   const S* from = next.at(kSolution);
   S* u = l.at(kSolution);
-  for_patches(0, static_cast<std::int32_t>(l.patched.patches.size()), threads_,
-              [&](std::int32_t p) {
-                TransferPoints<S> points(l.patched, static_cast<std::size_t>(p));
-                points.load(next.patched, from);
-                const Range& own = l.patched.patches[p].own;
-                for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
-                  const auto tile = static_cast<std::size_t>(t);
-                  for_packs<S>([&](int first) {
-                    store_tile(u, tile, first,
-                               load_tile(static_cast<const S*>(u), tile, first) +
-                                   masked(points.taken(tile, first), l.fixed(tile, first)));
-                  });
-                }
-              });
+  for_patches_of(level, [&](std::size_t patch) {
+    TransferPoints<S> points(l.patched, patch);
+    points.load(next.patched, from);
+    const Range& own = l.patched.patches[patch].own;
+    for (std::int32_t t = own.first / kGroup; t < own.end() / kGroup; ++t) {
+      const auto tile = static_cast<std::size_t>(t);
+      for_packs<S>([&](int first) {
+        store_tile(u, tile, first,
+                   load_tile(static_cast<const S*>(u), tile, first) +
+                       masked(points.taken(tile, first), l.fixed(tile, first)));
+      });
+    }
+  });
 }
 
 template <class S>

@@ -108,8 +108,6 @@ struct FastLevel {
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
-  /// Not 0: the solution of own vertices is this times D^-1 f, and not in its vector yet.
-  S first_step = 0;
 
   std::int32_t tiles() const { return static_cast<std::int32_t>(patched.tiles()); }
   std::int32_t scalars() const { return 3 * kGroup * tiles(); }
@@ -126,10 +124,6 @@ struct FastLevel {
     const Pack<S> xy = entry(1), xz = entry(2), yz = entry(4);
     return {fma(entry(0), r.x, fma(xy, r.y, xz * r.z)), fma(xy, r.x, fma(entry(3), r.y, yz * r.z)),
             fma(xz, r.x, fma(yz, r.y, entry(5) * r.z))};
-  }
-  /// A step of Jacobi from zero.
-  Vec3<Pack<S>> from_zero(S step, std::size_t tile, int first) {
-    return Pack<S>(step) * times_inverse(tile, first, load_tile(std::as_const(*this).at(kRight), tile, first));
   }
 };
 

@@ -15,8 +15,9 @@
 
 namespace kerf::cpu {
 
-/// At most one of a thread at a time: they share its buffers. Its loops are functions of their own
-/// where sweeps call them: among all that a sweep holds, GCC 12 keeps their counters in vectors.
+/// Of a thread at most one at a time that has loaded: another one takes its buffer. Its loops are
+/// functions of their own where sweeps call them: among all that a sweep holds, GCC 12 keeps their
+/// counters in vectors.
 template <class S>
 class TransferPoints {
  public:
@@ -43,7 +44,7 @@ class TransferPoints {
     }
   }
 
-  /// What the points give to own vertices. Of a tile, the first lanes are asked for first.
+  /// What the loaded points give to own vertices. Of a tile, the first lanes are asked for first.
   kernels::Vec3<Pack<S>> taken(std::size_t tile, int first) {
     if (first == 0) take(transfer_.tiles[tile], transfer_.terms.data() + kGroup * tile, kGroup);
     return gathered(static_cast<const S*>(rows_ + 4 * first));

@@ -28,6 +28,7 @@ struct CycleOptions {
 /// cells are too stiff in bending, and K-cycles repair it; on uncut ones V costs less.
 CycleOptions cycle_options(const SolverSetup& setup, const Hierarchy& hierarchy);
 
+/// What a setup asks for of the smoother.
 SmootherOptions smoother_options(const SolverSetup& setup);
 
 class Cycle {

@@ -273,10 +273,10 @@ TEST(MixedPrecision, TrueResidualIsFromAProductInDouble) {
 }
 
 /// One solve by conjugate gradients with a K-cycle.
-Solved solve(const Problem& p, const std::string& machine, double tolerance, int threads = 1) {
+Solved solve(const Problem& p, const std::string& machine, double tolerance) {
   SolverSetup setup;
   setup.cycle = CycleType::k;
-  return test::solve(p, *test::make_backend(machine, threads), setup, kDynamic, tolerance);
+  return test::solve(p, *test::make_backend(machine), setup, kDynamic, tolerance);
 }
 
 TEST(MixedPrecision, SolvesToATrueResidualThatSinglePrecisionNeverSees) {
@@ -289,24 +289,6 @@ TEST(MixedPrecision, SolvesToATrueResidualThatSinglePrecisionNeverSees) {
   EXPECT_LE(mixed.stats.residual, kFar);
   EXPECT_LE(std::abs(mixed.stats.cycles - exact.stats.cycles), 1);
   EXPECT_LE(relative(mixed.x, exact.x), 1e-8);  // the residual times the condition of the body
-}
-
-TEST(FastBackend, GivesTheSameBitsForAnyNumberOfThreads) {
-  LinkedOctree body(test::box_body({33, 22, 15}), 1);
-  test::cut_plane(body, {14.3, 9.2, 7.1}, {1, 0.2, 0.3}, 8);
-  ProblemOptions options;
-  options.coarsest_vertices = 300;
-  options.with_oracle = false;
-  const Problem p(std::move(body), options);
-  for (const char* machine : {"fast", "mixed"}) {
-    const Solved one = solve(p, machine, 1e-6, 1);
-    for (const int threads : {2, 3, 4}) {
-      const Solved more = solve(p, machine, 1e-6, threads);
-      EXPECT_EQ(more.stats.residual, one.stats.residual) << machine;
-      EXPECT_EQ(std::memcmp(more.x.data(), one.x.data(), sizeof(double) * p.unknowns(0)), 0)
-          << machine << ", " << threads << " threads";
-    }
-  }
 }
 
 /// A block that sags and is cut on its way, in either mode.

@@ -47,6 +47,8 @@ TEST(OutOfMemory, IsAnExceptionOfTheCallOnAnyNumberOfThreads) {
     backend->set_operator({1, 0});
   }
   test::write(*fast, 0, u, p.deformation());
+  for (const int x : {kSolution, kRight}) test::write(*fast, 0, x, p.free_vector(0, 2 + x));
+  expect_refused([&] { fast->restrict_from_solution(0); });
   test::write(*fast, 0, kResidual, p.free_vector(0, 1));
   expect_refused([&] { fast->restrict_residual(0); });
   expect_refused([&] { fast->rotate_cells(u); });
@@ -58,6 +60,10 @@ TEST(OutOfMemory, IsAnExceptionOfTheCallOnAnyNumberOfThreads) {
   for (Backend* backend : {fast.get(), reference.get()}) backend->apply(0, kResidual, kScratch);
   const auto found = p.read(*fast, 0, kScratch), expected = p.read(*reference, 0, kScratch);
   EXPECT_LE((found - expected).norm(), 1e-5 * expected.norm());
+  for (const int x : {kSolution, kRight}) test::write(*reference, 0, x, p.free_vector(0, 2 + x));
+  for (Backend* backend : {fast.get(), reference.get()}) backend->restrict_from_solution(0);
+  const auto given = p.read(*fast, 1, kRight), due = p.read(*reference, 1, kRight);
+  EXPECT_LE((given - due).norm(), 1e-5 * due.norm());
 }
 
 }  // namespace

@@ -51,8 +51,7 @@ TEST(ConvergenceCube, ChebyshevBeatsGaussSeidel) {
   EXPECT_EQ(relaxed.omega, 1);
 }
 
-// Damped Jacobi: more cycles than with two steps a sweep, at most twice as many.
-TEST(ConvergenceCube, DegreeOneLiesBetween) {
+TEST(ConvergenceCube, DegreeOneTakesMoreCyclesButNotTwice) {
   const Record one = run("cube", "16^3, V(1,1) Chebyshev 1");
   const Record two = run("cube", "16^3, V(1,1) Chebyshev 2");
 
