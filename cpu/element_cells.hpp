@@ -15,14 +15,19 @@
 
 namespace kerf::cpu {
 
+/// S: the precision in which their rotations are stored.
 template <class S>
 struct FinestCells {
   const PatchedLevel& level;
-  const FinestValues<S>& values;
+  const FinestRotations<S>& rotations;
 
   const CellKind& kind(std::size_t lane) const { return level.kinds[level.kind[lane / kGroup]]; }
   /// w; the others follow in steps of a group.
-  const S* rotation(std::size_t lane) const { return values.rotation.data() + values.place(lane); }
+  const S* rotation(std::size_t lane) const { return rotations.of(lane); }
+  template <class T>
+  T component(std::size_t lane, std::size_t c) const {
+    return rotations.template component<T>(lane, c);
+  }
 };
 
 /// What a cell of level 1 is as one element.
@@ -44,6 +49,10 @@ struct TurnedCells {
     return element_kind(finest.kinds, level.kind[lane / kGroup]);
   }
   const S* rotation(std::size_t lane) const { return matrices.rotation_of(lane); }
+  template <class T>
+  T component(std::size_t lane, std::size_t c) const {
+    return rotation(lane)[kGroup * c];
+  }
   /// Whether all children are such. `lanes`: [octant][kGroup], -1: none.
   bool are_all(const std::int32_t* lanes) const {
     for (int octant = 0; octant < 8; ++octant)
@@ -80,8 +89,8 @@ void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat
     q[0][k] = 1;
     q[1][k] = q[2][k] = q[3][k] = 0;
     if (lanes[k] < 0) continue;
-    const S* const from = cells.rotation(static_cast<std::size_t>(lanes[k]));
-    for (std::size_t c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
+    for (std::size_t c = 0; c < 4; ++c)
+      q[c][k] = cells.template component<S>(static_cast<std::size_t>(lanes[k]), c);
   }
   out = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
 }

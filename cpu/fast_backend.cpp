@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cpu/fast_rotate.hpp"
 #include "cpu/fast_state.hpp"
 
 namespace kerf::cpu {
@@ -22,9 +23,8 @@ FastBackend<S>::FastBackend(int threads, bool updates)
 
 template <class S>
 std::size_t FastBackend<S>::bytes() const {
-  std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + bytes_of(exact_.rotation) +
-                    bytes_of(single_.rotation) + bytes_of(exact_.materials) +
-                    bytes_of(single_.materials);
+  std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + rotations_.bytes() +
+                    bytes_of(exact_materials_) + bytes_of(single_materials_);
   for (const FastLevel<S>& level : levels_) {
     sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
            level.vectors.bytes();
@@ -53,12 +53,11 @@ PackedMaterial<T> pack_material(double poisson, bool lumped) {
 }
 
 template <class T>
-void start_values(const Hierarchy& hierarchy, const PatchedLevel& finest, FinestValues<T>& values) {
-  values.rotation.clear();
-  values.materials.clear();
+std::vector<PackedMaterial<T>> pack_materials(const Hierarchy& hierarchy) {
+  std::vector<PackedMaterial<T>> out;
   for (const double poisson : hierarchy.poisson)
-    values.materials.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
-  values.no_rotation(0, finest.groups());
+    out.push_back(pack_material<T>(poisson, hierarchy.lumped_mass));
+  return out;
 }
 
 // Peaks of runs: docs/results.md, under Memory.
@@ -91,8 +90,9 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
   }
   folds_ = SlotTable<S>(hierarchy.lumped_mass ? kernels::MassModel::lumped
                                               : kernels::MassModel::consistent);
-  start_values(hierarchy, levels_[0].patched, exact_);
-  if constexpr (!std::is_same_v<S, double>) start_values(hierarchy, levels_[0].patched, single_);
+  rotations_.start(levels_[0].patched.groups());
+  exact_materials_ = pack_materials<double>(hierarchy);
+  if constexpr (!kIsDouble) single_materials_ = pack_materials<float>(hierarchy);
   load_coarsest();
 }
 
@@ -110,17 +110,17 @@ void renumber(const std::vector<PatchMoves::Move>& moves, std::size_t size, Arra
 }
 
 /// Rotations of the cells that have another lane now, and of new ones.
-template <class T>
-void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestValues<T>& values) {
-  std::vector<std::array<T, 4>> before(moves.cells.size());
+template <class S>
+void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestRotations<S>& rotations) {
+  std::vector<std::array<double, 4>> before(moves.cells.size());
   for (std::size_t n = 0; n < before.size(); ++n)
-    before[n] = values.at(static_cast<std::size_t>(moves.cells[n].from));
-  values.rotation.resize(4 * finest.cell.size());
+    before[n] = rotations.at(static_cast<std::size_t>(moves.cells[n].from));
+  rotations.resize(finest.groups());
   for (const Range& groups : moves.groups)
-    values.no_rotation(static_cast<std::size_t>(groups.first),
-                       static_cast<std::size_t>(groups.end()));
+    rotations.no_rotation(static_cast<std::size_t>(groups.first),
+                          static_cast<std::size_t>(groups.end()));
   for (std::size_t n = 0; n < before.size(); ++n)
-    values.put(static_cast<std::size_t>(finest.lane[moves.cells[n].to]), before[n]);
+    rotations.put(static_cast<std::size_t>(finest.lane[moves.cells[n].to]), before[n]);
 }
 
 template <class S>
@@ -142,9 +142,7 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       renumber(moves.vertices, size, level.vectors.held(x).exact);
     }
     level.vectors.set_scalars(size);
-    if (l > 0) continue;
-    renumber(moves, level.patched, exact_);
-    if constexpr (!std::is_same_v<S, double>) renumber(moves, level.patched, single_);
+    if (l == 0) renumber(moves, level.patched, rotations_);
   }
   load_coarsest();
 }
@@ -172,14 +170,6 @@ void FastBackend<S>::set_operator(const OperatorScale& scale) {
 }
 
 template <class S>
-void FastBackend<S>::round_rotations(std::size_t group) {
-  constexpr std::size_t kScalars = 4 * kGroup;
-  if constexpr (!kIsDouble)
-    for (std::size_t i = kScalars * group; i < kScalars * (group + 1); ++i)
-      single_.rotation[i] = static_cast<S>(exact_.rotation[i]);
-}
-
-template <class S>
 void FastBackend<S>::rotate_cells(int displacement) {
   expects_exact(displacement, displacement);
   settle();
@@ -189,10 +179,10 @@ void FastBackend<S>::rotate_cells(int displacement) {
     const Patch& patch = l.patches[p];
     PatchPoints<double> points(l, patch);
     points.load([&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u);
-    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
-      rotate_group(l, exact_, static_cast<std::size_t>(g), points.x());
-      round_rotations(static_cast<std::size_t>(g));
-    }
+    constexpr int kMost = RotationBatch::kGroups;
+    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); g += kMost)
+      rotate_groups(l, rotations_, static_cast<std::size_t>(g),
+                    std::min(kMost, patch.groups.end() - g), points.x());
   });
 }
 
@@ -200,20 +190,17 @@ template <class S>
 void FastBackend<S>::read_rotations(std::span<double> out) const {
   const PatchedLevel& packed = levels_[0].patched;
   for (std::size_t c = 0; c < packed.lane.size(); ++c) {
-    const std::size_t from = exact_.place(static_cast<std::size_t>(packed.lane[c]));
-    for (std::size_t k = 0; k < 4; ++k) out[4 * c + k] = exact_.rotation[from + kGroup * k];
+    const auto q = rotations_.at(static_cast<std::size_t>(packed.lane[c]));
+    std::copy(q.begin(), q.end(), out.begin() + 4 * static_cast<std::ptrdiff_t>(c));
   }
 }
 
 template <class S>
 void FastBackend<S>::write_rotations(std::span<const double> in) {
   const PatchedLevel& packed = levels_[0].patched;
-  for (std::size_t c = 0; c < packed.lane.size(); ++c) {
-    const std::size_t to = exact_.place(static_cast<std::size_t>(packed.lane[c]));
-    for (std::size_t k = 0; k < 4; ++k) exact_.rotation[to + kGroup * k] = in[4 * c + k];
-  }
-  parallel(static_cast<std::int32_t>(packed.groups()), kWorthGroups,
-           [&](std::int32_t g) { round_rotations(static_cast<std::size_t>(g)); });
+  for (std::size_t c = 0; c < packed.lane.size(); ++c)
+    rotations_.put(static_cast<std::size_t>(packed.lane[c]),
+                   {in[4 * c], in[4 * c + 1], in[4 * c + 2], in[4 * c + 3]});
 }
 
 template <class S>

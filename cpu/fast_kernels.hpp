@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/backend.hpp"
+#include "cpu/finest_values.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/stored_matrices.hpp"
 #include "kernels/corotate.hpp"
@@ -23,51 +24,6 @@
 namespace kerf::cpu {
 
 using kernels::kEntries;
-
-/// Constants of one Poisson ratio and mass model, in every lane.
-template <class S>
-struct PackedMaterial {
-  kernels::ModeConstants<Pack<S>> modes;
-  kernels::HexStiffness<Pack<S>> stiffness;
-  kernels::HexMass<Pack<S>> mass;
-};
-
-/// What the elements of level 0 are made of.
-template <class S>
-struct FinestValues {
-  Array<S> rotation;  // [group][w x y z][lane]
-  std::vector<PackedMaterial<S>> materials;
-
-  /// Where w of a lane lies; the others follow in steps of a group.
-  static std::size_t place(std::size_t lane) {
-    return 4 * kGroup * (lane / kGroup) + lane % kGroup;
-  }
-  std::array<S, 4> at(std::size_t lane) const {
-    const S* q = rotation.data() + place(lane);
-    return {q[0], q[kGroup], q[2 * kGroup], q[3 * kGroup]};
-  }
-  void put(std::size_t lane, const std::array<S, 4>& q) {
-    for (std::size_t k = 0; k < 4; ++k) rotation[place(lane) + kGroup * k] = q[k];
-  }
-  /// The identity in some groups.
-  void no_rotation(std::size_t begin, std::size_t end) {
-    rotation.resize(std::max(rotation.size(), 4 * kGroup * end));
-    std::fill(rotation.begin() + 4 * kGroup * begin, rotation.begin() + 4 * kGroup * end, S(0));
-    for (std::size_t g = begin; g < end; ++g)
-      std::fill_n(rotation.begin() + 4 * kGroup * g, kGroup, S(1));
-  }
-  kernels::Quat<Pack<S>> quaternion(std::size_t group, int first_lane) const {
-    return load_quaternion(rotation.data() + 4 * kGroup * group + first_lane);
-  }
-  /// Asks memory for those that are needed a few groups later.
-  void prefetch_behind(std::size_t group) const {
-    constexpr std::size_t kAhead = 4, kScalars = 4 * kGroup;
-    prefetch(rotation.data(), kScalars * (group + kAhead), kScalars);
-  }
-  void set_quaternion(std::size_t group, int first_lane, const kernels::Quat<Pack<S>>& q) {
-    store_quaternion(rotation.data() + 4 * kGroup * group + first_lane, q);
-  }
-};
 
 /// Cells of a row within a pack.
 template <RowKind kKind, class S>
@@ -147,8 +103,8 @@ void element_products(const PatchedLevel& level, const CellKind& kind,
   });
 }
 
-template <class S>
-void finest_products(const PatchedLevel& level, const FinestValues<S>& values,
+template <class Values, class S>
+void finest_products(const PatchedLevel& level, const Values& values,
                      const OperatorScale& scale, std::size_t group, const S* x, S* y) {
   const CellKind& kind = level.kinds[level.kind[group]];
   values.prefetch_behind(group);
@@ -174,8 +130,8 @@ void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrice
 }
 
 /// y += the elastic force of a group of level 0 displaced by x.
-template <class S>
-void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, std::size_t group,
+template <class Values, class S>
+void elastic_forces(const PatchedLevel& level, const Values& values, std::size_t group,
                     const S* x, S* y) {
   using P = Pack<S>;
   const CellKind& kind = level.kinds[level.kind[group]];
@@ -187,73 +143,6 @@ void elastic_forces(const PatchedLevel& level, const FinestValues<S>& values, st
                            values.materials[kind.material].modes.stiffness, at);
     add_corners<row()>(points, at, y);
   });
-}
-
-/// Two packs of rotations from mean gradients, warm-started: they take their steps in turn, since
-/// each operation of a step waits for the one before. Where Newton proves nothing within its steps,
-/// a lane goes the way of the reference.
-template <class S>
-KERF_FLATTEN void rotate_two(const kernels::Mat3<Pack<S>>* F, const kernels::Quat<Pack<S>>* start,
-                             kernels::Quat<Pack<S>>* q) {
-  using P = Pack<S>;
-  constexpr int kIterations = 8, kPacks = 2;
-  const P small2 = P(S(0.01) * kernels::Precision<S>::kEpsilon);
-  PackMask<S> proven[kPacks], lost[kPacks];
-  for (int n = 0; n < kPacks; ++n) {
-    q[n] = start[n];
-    proven[n] = lost[n] = {P(S(1)).v < P(S(0)).v};
-  }
-  for (int i = 0; i < kIterations; ++i) {
-    bool done = true;
-    for (int n = 0; n < kPacks; ++n) {
-      kernels::RotationStep<P> step;
-      kernels::rotation_step(F[n], q[n], step);
-      lost[n] = lost[n] || !(step.ascent || proven[n]);
-      q[n] = {select(proven[n], q[n].w, step.next.w), select(proven[n], q[n].x, step.next.x),
-              select(proven[n], q[n].y, step.next.y), select(proven[n], q[n].z, step.next.z)};
-      proven[n] = proven[n] || (step.ascent && step.length2 <= small2);
-      done = done && all(proven[n] || lost[n]);
-    }
-    if (done) break;
-  }
-  for (int n = 0; n < kPacks; ++n) {
-    q[n] = kernels::normalised(q[n]);
-    const PackMask<S> done = proven[n] && !lost[n];
-    for (int k = 0; k < P::kLanes && !all(done); ++k) {
-      if (done.v[k] != 0) continue;
-      kernels::Mat3<S> f;
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) f[a][b] = F[n][a][b][k];
-      const kernels::Quat<P>& from = start[n];
-      const auto turned = kernels::extract_rotation(
-          f, kernels::Quat<S>{from.w[k], from.x[k], from.y[k], from.z[k]});
-      q[n].w.set(k, turned.w);
-      q[n].x.set(k, turned.x);
-      q[n].y.set(k, turned.y);
-      q[n].z.set(k, turned.z);
-    }
-  }
-}
-
-/// Rotations of a group from the displacements.
-template <class S>
-void rotate_group(const PatchedLevel& level, FinestValues<S>& values, std::size_t group,
-                  const S* x) {
-  using P = Pack<S>;
-  constexpr int kPacks = kGroup / P::kLanes;
-  static_assert(kPacks % 2 == 0);
-  const P side = P(level.kinds[level.kind[group]].side);
-  kernels::Mat3<P> F[kPacks];
-  kernels::Quat<P> start[kPacks], q[kPacks];
-  values.prefetch_behind(group);
-  for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
-    kernels::Vec3<P> corners[8];
-    gather_corners<row()>(points, x, corners);
-    F[first / P::kLanes] = kernels::mean_gradient(corners, side);
-    start[first / P::kLanes] = values.quaternion(group, first);
-  });
-  for (int n = 0; n < kPacks; n += 2) rotate_two<S>(F + n, start + n, q + n);
-  for (int n = 0; n < kPacks; ++n) values.set_quaternion(group, n * P::kLanes, q[n]);
 }
 
 }  // namespace kerf::cpu

@@ -31,8 +31,9 @@ struct FinestLanes {
   std::int32_t cell[P::kLanes];
   static constexpr int kMixed = -2;
 
-  FinestLanes(const PatchedLevel& level, const FinestValues<S>& values, const OperatorScale& scale,
-              const std::int32_t* cells) {
+  template <class Stored>
+  FinestLanes(const PatchedLevel& level, const FinestRotations<Stored>& rotations,
+              const OperatorScale& scale, const std::int32_t* cells) {
     std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) {
       cell[k] = cells[k];
@@ -43,7 +44,7 @@ struct FinestLanes {
       any_held = any_held || level.held[cell[k]] != kFree;
       material = material == kAnyMaterial || material == its ? its : kMixed;
     }
-    load_elements(FinestCells<S>{level, values}, scale, lanes, kAnyMaterial, element);
+    load_elements(FinestCells<Stored>{level, rotations}, scale, lanes, kAnyMaterial, element);
   }
 };
 
@@ -118,15 +119,15 @@ void corner_matrices(const PackedMaterial<S>& m, const kernels::FinestChild<Pack
 
 /// The same where lanes may be of several materials.
 template <class S>
-void corner_matrices(const PatchedLevel& level, const FinestValues<S>& values,
+void corner_matrices(const PatchedLevel& level, const std::vector<PackedMaterial<S>>& materials,
                      const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
   if (lanes.material != FinestLanes<S>::kMixed) {
     const auto material = static_cast<std::size_t>(std::max(lanes.material, 0));
-    return corner_matrices(values.materials[material], lanes.element, full);
+    return corner_matrices(materials[material], lanes.element, full);
   }
-  for (std::size_t m = 0; m < values.materials.size(); ++m) {
+  for (std::size_t m = 0; m < materials.size(); ++m) {
     Pack<S> some[24][24];
-    corner_matrices(values.materials[m], lanes.element, some);
+    corner_matrices(materials[m], lanes.element, some);
     for (int k = 0; k < Pack<S>::kLanes; ++k) {
       const bool none = lanes.cell[k] < 0;
       if (!none && level.kinds[level.kind[level.lane[lanes.cell[k]] / kGroup]].material != m)

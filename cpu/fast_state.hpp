@@ -18,6 +18,7 @@
 #include "cpu/element_cells.hpp"
 #include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
+#include "cpu/finest_values.hpp"
 #include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/parallel_errors.hpp"
@@ -233,9 +234,17 @@ class FastBackend final : public Backend {
 
   int append_vector(bool exact);
   void load_coarsest();
-  void round_rotations(std::size_t group);
   template <class T>
-  const FinestValues<T>& values_of() const;
+  const std::vector<PackedMaterial<T>>& materials() const {
+    if constexpr (std::is_same_v<T, double>)
+      return exact_materials_;
+    else
+      return single_materials_;
+  }
+  template <class T>
+  FinestValues<T, S> values_of() const {
+    return {rotations_, materials<T>()};
+  }
   template <class T>
   T* partial_sums(std::size_t scalars);
   template <class T, class From, class Before, class Start, class Own, class Cells, class Finish>
@@ -253,12 +262,12 @@ class FastBackend final : public Backend {
   void apply_typed(int level, int in, int out);
   auto elastic_cells() const {
     return [this](std::size_t group, const double* x, double* y) {
-      elastic_forces(levels_[0].patched, exact_, group, x, y);
+      elastic_forces(levels_[0].patched, values_of<double>(), group, x, y);
     };
   }
   auto scaled_cells(const OperatorScale& scale) const {
     return [this, scale](std::size_t group, const double* x, double* y) {
-      finest_products(levels_[0].patched, exact_, scale, group, x, y);
+      finest_products(levels_[0].patched, values_of<double>(), scale, group, x, y);
     };
   }
   template <class Cells, class Finish>
@@ -311,8 +320,9 @@ class FastBackend final : public Backend {
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   OperatorScale scale_;
-  FinestValues<double> exact_;  // of level 0
-  FinestValues<S> single_;      // the same, rounded; empty if S is double
+  FinestRotations<S> rotations_;
+  std::vector<PackedMaterial<double>> exact_materials_;
+  std::vector<PackedMaterial<float>> single_materials_;  // the same, rounded; none if S is double
   SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
@@ -324,15 +334,6 @@ class FastBackend final : public Backend {
   FrontFactor<S> coarsest_factor_;
   bool factored_ = false;
 };
-
-template <class S>
-template <class T>
-const FinestValues<T>& FastBackend<S>::values_of() const {
-  if constexpr (std::is_same_v<T, double>)
-    return exact_;
-  else
-    return single_;
-}
 
 template <class S>
 template <class T>
@@ -370,6 +371,7 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
         PatchPoints<T> points(l, patch);
         start(static_cast<std::size_t>(p));
         points.load(own, u);
+        points.start_sums();
         for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g)
           cells(static_cast<std::size_t>(g), points.x(), points.y());
         sums[p] = points.store(finish, partial);
@@ -403,7 +405,7 @@ void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y
     if (!l.matrices.is_turned(group)) return stored_products(l.patched, l.matrices, group, x, y);
     const CellKind kind = element_kind(level, group);
     element_products(
-        l.patched, kind, values_of<S>().materials[kind.material], scale_, group,
+        l.patched, kind, materials<S>()[kind.material], scale_, group,
         [&](int first) { return l.matrices.rotation(group, first); }, x, y);
   }
 }

@@ -19,7 +19,7 @@ void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack
                                      Pack<S> (&out)[kEntries]) const {
   const FastLevel<S>& l = levels_[level];
   l.matrices.gather(lanes, out);
-  if (level == 1) add_turned(turned_cells(), values_of<S>().materials, scale_, lanes, out);
+  if (level == 1) add_turned(turned_cells(), materials<S>(), scale_, lanes, out);
 }
 
 // Some children of the coarse cells in the lanes, one each. Held components are those of slots, so
@@ -32,8 +32,8 @@ void FastBackend<S>::add_general_children(int fine, const std::int32_t (&child)[
   P full[24][24];
   bool over_slots = false;
   if (fine == 0) {
-    const FinestLanes<S> lanes(packed, values_of<S>(), scale_, child);
-    corner_matrices(packed, values_of<S>(), lanes, full);
+    const FinestLanes<S> lanes(packed, rotations_, scale_, child);
+    corner_matrices(packed, materials<S>(), lanes, full);
     over_slots = lanes.any_held;
     if (lanes.any_held && lanes.any_folded) fold_matrices<P>(packed, child, full);
     if (lanes.any_held) mask_matrices(packed, lanes, full);
@@ -74,8 +74,7 @@ void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
   if (!children.any_plain()) return;
   P some[kEntries];
   std::fill(std::begin(some), std::end(some), P(0));
-  merge_elements(FinestCells<S>{from, values_of<S>()}, values_of<S>().materials, scale_,
-                 children.plain(), some);
+  merge_elements(FinestCells<S>{from, rotations_}, materials<S>(), scale_, children.plain(), some);
   for (int e = 0; e < kEntries; ++e) out[e] += some[e];
 }
 
@@ -88,7 +87,7 @@ void FastBackend<S>::turn() {
   const double least = std::cos(0.5 * kNear);
   FastLevel<S>& to = levels_[1];
   const PatchedLevel& packed = to.patched;
-  const FinestCells<S> cells{levels_[0].patched, values_of<S>()};
+  const FinestCells<S> cells{levels_[0].patched, rotations_};
   // The mass of lumped cells is not that of a lumped one.
   const bool may_be_one =
       !kIsDouble && levels_.size() > 2 && (scale_.mass == 0 || !hierarchy_->lumped_mass);
@@ -124,7 +123,7 @@ void FastBackend<S>::coarsen(int fine) {
   if (fine == 0) turn();
   to.matrices.allocate();
   const auto groups = static_cast<std::int32_t>(packed.groups());
-  const std::vector<PackedMaterial<S>>& materials = values_of<S>().materials;
+  const std::vector<PackedMaterial<S>>& all = materials<S>();
   // General cells cost many times as much as others, and lie together.
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
@@ -143,10 +142,9 @@ void FastBackend<S>::coarsen(int fine) {
       if (kind == kGeneral || kind == kGeneralPassed)
         merge_general(fine, group, first, out);
       else if (fine == 0)
-        merge_elements(FinestCells<S>{from.patched, values_of<S>()}, materials, scale_, children,
-                       out);
+        merge_elements(FinestCells<S>{from.patched, rotations_}, all, scale_, children, out);
       else if (fine == 1 && !passed && turned_cells().are_all(children))
-        merge_elements(turned_cells(), materials, scale_, children, out);
+        merge_elements(turned_cells(), all, scale_, children, out);
       else
         merge_stored<S>(
             [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
@@ -207,9 +205,9 @@ void FastBackend<S>::prepare(int level) {
       }
       const CellKind kind = element_kind(level, group);
       add_element_diagonals(
-          packed, kind, values_of<S>().materials[kind.material].modes, scale_, folds_, group,
+          packed, kind, materials<S>()[kind.material].modes, scale_, folds_, group,
           [&](int first) {
-            return level == 0 ? values_of<S>().quaternion(group, first)
+            return level == 0 ? rotations_.template load<S>(group, first)
                               : l.matrices.rotation(group, first);
           },
           to);
@@ -239,8 +237,8 @@ void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<d
   const PatchedLevel& packed = levels_[level].patched;
   bool any_folded = false;
   if (level == 0) {
-    const FinestLanes<double> lanes(packed, exact_, scale_, cells);
-    corner_matrices(packed, exact_, lanes, full);
+    const FinestLanes<double> lanes(packed, rotations_, scale_, cells);
+    corner_matrices(packed, materials<double>(), lanes, full);
     if (lanes.any_folded) fold_matrices<P>(packed, cells, full);
     if (lanes.any_held) mask_matrices(packed, lanes, full);
     return;

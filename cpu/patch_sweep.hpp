@@ -61,27 +61,19 @@ kernels::Vec3<Pack<S>> load_tile(const S* x, std::size_t tile, int first) {
 /// The same from a vector of any precision.
 template <class S, class From>
 kernels::Vec3<Pack<S>> load_tile_as(const From* x, std::size_t tile, int first) {
-  typedef From Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(From))));
   if (first == 0) prefetch_tile(x, tile, 3);
   kernels::Vec3<Pack<S>> out;
-  for (int c = 0; c < 3; ++c) {
-    Narrow narrow;
-    __builtin_memcpy(&narrow, x + kTileScalars * tile + kGroup * c + first, sizeof narrow);
-    out[c].v = __builtin_convertvector(narrow, typename Pack<S>::Vector);
-  }
+  for (int c = 0; c < 3; ++c)
+    out[c] = load_pack_as<S>(x + kTileScalars * tile + kGroup * c + first);
   return out;
 }
 
 /// To a vector of any precision; returns what is there now.
 template <class To, class S>
 kernels::Vec3<Pack<S>> store_tile_as(To* x, std::size_t tile, int first, kernels::Vec3<Pack<S>> v) {
-  typedef To Narrow __attribute__((vector_size(Pack<S>::kLanes * sizeof(To))));
   if (first == 0) prefetch_tile<true>(static_cast<const To*>(x), tile, 3);
-  for (int c = 0; c < 3; ++c) {
-    const Narrow narrow = __builtin_convertvector(v[c].v, Narrow);
-    __builtin_memcpy(x + kTileScalars * tile + kGroup * c + first, &narrow, sizeof narrow);
-    v[c].v = __builtin_convertvector(narrow, typename Pack<S>::Vector);
-  }
+  for (int c = 0; c < 3; ++c)
+    v[c] = store_pack_as(x + kTileScalars * tile + kGroup * c + first, v[c]);
   return v;
 }
 
@@ -157,10 +149,8 @@ class PatchPoints {
   using P = Pack<S>;
 
   PatchPoints(const PatchedLevel& level, const Patch& patch) : level_(level), patch_(patch) {
-    thread_local PointBuffer<S> x, y;
-    const std::size_t scalars = 4 * static_cast<std::size_t>(patch.points);
-    x_ = x.reserve(scalars);
-    y_ = y.reserve(scalars);
+    thread_local PointBuffer<S> x;
+    x_ = x.reserve(4 * static_cast<std::size_t>(patch.points));
   }
 
   const S* x() const { return x_; }
@@ -174,7 +164,13 @@ class PatchPoints {
     load_copies(u);
     interpolate_hanging();
     std::fill_n(x_ + 4 * std::size_t(kNothing), 4, S(0));
-    std::fill_n(y_, 4 * std::size_t(patch_.points), S(0));
+  }
+  /// Zero in y, which is not there before.
+  void start_sums() {
+    thread_local PointBuffer<S> y;
+    const std::size_t scalars = 4 * static_cast<std::size_t>(patch_.points);
+    y_ = y.reserve(scalars);
+    std::fill_n(y_, scalars, S(0));
   }
 
   /// finish(tile, first lane, sum, value): what the cells added to vertices of this patch alone,
@@ -248,7 +244,7 @@ class PatchPoints {
   const PatchedLevel& level_;
   const Patch& patch_;
   S* x_;
-  S* y_;
+  S* y_ = nullptr;
 };
 
 /// The sums of the n-th tile of shared vertices over their copies, of the lanes from `first` on.

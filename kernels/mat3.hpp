@@ -299,11 +299,14 @@ KERF_HD Mat3<T> to_matrix(const Quat<T>& q) {
 /// |q|^2 times the rotation of q.
 template <class T>
 KERF_HD Mat3<T> to_scaled_matrix(const Quat<T>& q) {
-  const Mat3<T> D = to_matrix_less_identity(q);  // times |q|^2
-  const T square = fma(q.w, q.w, q.x * q.x) + fma(q.y, q.y, q.z * q.z);
-  return {{{square + D[0][0], D[0][1], D[0][2]},
-           {D[1][0], square + D[1][1], D[1][2]},
-           {D[2][0], D[2][1], square + D[2][2]}}};
+  const T x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const T xy = x2 * q.y, xz = x2 * q.z, yz = y2 * q.z;
+  const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
+  const T ww = q.w * q.w, xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z;
+  const T sum = ww + xx, less = ww - xx, other = yy - zz;
+  return {
+      {{sum - (yy + zz), xy - wz, xz + wy}, {xy + wz, less + other, yz - wx},
+       {xz - wy, yz + wx, less - other}}};
 }
 
 }  // namespace kerf::kernels

@@ -46,6 +46,16 @@ struct RotationStep {
   decltype(T(0) < T(0)) ascent;  // tr(S) I - S was safely positive definite
 };
 
+/// q times (1, w).
+template <class T>
+KERF_HD Quat<T> turned_on(const Quat<T>& q, const Vec3<T>& w) {
+  const Vec3<T> less = -w;
+  return {fma(q.x, less.x, fma(q.y, less.y, fma(q.z, less.z, q.w))),
+          fma(q.w, w.x, fma(q.y, w.z, fma(q.z, less.y, q.x))),
+          fma(q.w, w.y, fma(q.z, w.x, fma(q.x, less.z, q.y))),
+          fma(q.w, w.z, fma(q.x, w.y, fma(q.y, less.x, q.z)))};
+}
+
 /// One Newton step for the maximum of tr(R^T F): omega = (tr(S) I - S)^-1 axial(R^T F), applied as
 /// the Cayley quaternion (1, omega / 2). Where that matrix is not safely positive definite, q
 /// stays. A step from a longer q is the same, so several need no square root but that of
@@ -61,22 +71,23 @@ KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& 
   const Mat3<T> A = transpose(to_scaled_matrix(q)) * F;
   const Vec3<T> axial{A[2][1] - A[1][2], A[0][2] - A[2][0], A[1][0] - A[0][1]};
   const T hxx = A[1][1] + A[2][2], hyy = A[0][0] + A[2][2], hzz = A[0][0] + A[1][1];
-  const T hxy = T(-0.5) * (A[0][1] + A[1][0]);
-  const T hxz = T(-0.5) * (A[0][2] + A[2][0]);
-  const T hyz = T(-0.5) * (A[1][2] + A[2][1]);
+  const T sxy = T(0.5) * (A[0][1] + A[1][0]), hxy = -sxy;
+  const T sxz = T(0.5) * (A[0][2] + A[2][0]), hxz = -sxz;
+  const T syz = T(0.5) * (A[1][2] + A[2][1]), hyz = -syz;
 
-  const T cxx = hyy * hzz - hyz * hyz, cxy = hxz * hyz - hxy * hzz, cxz = hxy * hyz - hxz * hyy;
-  const T cyy = hxx * hzz - hxz * hxz, cyz = hxy * hxz - hxx * hyz, czz = hxx * hyy - hxy * hxy;
-  const T det = hxx * cxx + hxy * cxy + hxz * cxz;
+  const T cxx = fma(hyy, hzz, hyz * syz), cyy = fma(hxx, hzz, hxz * sxz);
+  const T cxy = fma(hxz, hyz, hzz * sxy), czz = fma(hxx, hyy, hxy * sxy);
+  const T cxz = fma(hxy, hyz, hyy * sxz), cyz = fma(hxy, hxz, hxx * syz);
+  const T det = fma(hxx, cxx, fma(hxy, cxy, hxz * cxz));
   const T trace = hxx + hyy + hzz;
   // Near a half turn hxx and hyy can be rounding above zero, with det and trace below.
   const auto ascent =
       hxx > T(0) && czz > T(0) && trace > T(0) && det > kSafe * (trace * trace * trace);
   const T half = select(ascent, T(0.5) / select(ascent, det, T(1)), T(0));
-  const Vec3<T> w{half * (cxx * axial.x + cxy * axial.y + cxz * axial.z),
-                  half * (cxy * axial.x + cyy * axial.y + cyz * axial.z),
-                  half * (cxz * axial.x + cyz * axial.y + czz * axial.z)};
-  out.next = q * Quat<T>{T(1), w.x, w.y, w.z};
+  const Vec3<T> w{half * fma(cxx, axial.x, fma(cxy, axial.y, cxz * axial.z)),
+                  half * fma(cxy, axial.x, fma(cyy, axial.y, cyz * axial.z)),
+                  half * fma(cxz, axial.x, fma(cyz, axial.y, czz * axial.z))};
+  out.next = turned_on(q, w);
   out.length2 = T(4) * dot(w, w);
   out.ascent = ascent;
 }

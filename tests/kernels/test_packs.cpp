@@ -145,6 +145,10 @@ struct NumberedCells {
   const S* rotation(std::size_t lane) const {
     return all.data() + 4 * cpu::kGroup * (lane / cpu::kGroup) + lane % cpu::kGroup;
   }
+  template <class T>
+  T component(std::size_t lane, std::size_t c) const {
+    return rotation(lane)[cpu::kGroup * c];
+  }
 };
 
 // Children of cells in a row are every other lane of two groups; others are anywhere, or absent.
