@@ -104,8 +104,8 @@ void element_products(const PatchedLevel& level, const CellKind& kind,
 }
 
 template <class Values, class S>
-void finest_products(const PatchedLevel& level, const Values& values,
-                     const OperatorScale& scale, std::size_t group, const S* x, S* y) {
+void finest_products(const PatchedLevel& level, const Values& values, const OperatorScale& scale,
+                     std::size_t group, const S* x, S* y) {
   const CellKind& kind = level.kinds[level.kind[group]];
   values.prefetch_behind(group);
   element_products(
@@ -131,8 +131,8 @@ void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrice
 
 /// y += the elastic force of a group of level 0 displaced by x.
 template <class Values, class S>
-void elastic_forces(const PatchedLevel& level, const Values& values, std::size_t group,
-                    const S* x, S* y) {
+void elastic_forces(const PatchedLevel& level, const Values& values, std::size_t group, const S* x,
+                    S* y) {
   using P = Pack<S>;
   const CellKind& kind = level.kinds[level.kind[group]];
   values.prefetch_behind(group);

@@ -52,8 +52,8 @@ KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
       for (int b = 0; b < 3; ++b)
         F[a][b] = {joined(from[0][a][b], from[1][a][b]), joined(from[2][a][b], from[3][a][b])};
     kernels::Quat<P>*const first = batch.near + n, *const second = first + 1;
-    kernels::Quat<T> q{{first->w, second->w}, {first->x, second->x}, {first->y, second->y},
-                       {first->z, second->z}};
+    kernels::Quat<T> q{
+        {first->w, second->w}, {first->x, second->x}, {first->y, second->y}, {first->z, second->z}};
     for (int i = 0; i < kIterations; ++i) {
       kernels::RotationStep<T> step;
       kernels::rotation_step(F, q, step);
@@ -132,7 +132,7 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
   for (int n = 0; n < kHalf * count; ++n) {
     const std::size_t group = begin + static_cast<std::size_t>(n / kHalf);
     const int first = 2 * (n % kHalf) * P::kLanes, second = first + P::kLanes;
-    const kernels::Mat3<P>*const F = batch.gradient + 2 * n;
+    const kernels::Mat3<P>* const F = batch.gradient + 2 * n;
     kernels::Mat3<T> both;
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) both[a][b] = {F[0][a][b], F[1][a][b]};

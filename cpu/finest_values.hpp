@@ -36,9 +36,7 @@ class FinestRotations {
   static constexpr std::size_t kScalars = 4 * kGroup;  // of a group
 
   /// Where w of a lane lies; the others follow in steps of a group.
-  static std::size_t place(std::size_t lane) {
-    return kScalars * (lane / kGroup) + lane % kGroup;
-  }
+  static std::size_t place(std::size_t lane) { return kScalars * (lane / kGroup) + lane % kGroup; }
   const S* of(std::size_t lane) const { return rounded_.data() + place(lane); }
 
   /// In the precision T; in single precision rounded.

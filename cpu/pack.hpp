@@ -98,8 +98,8 @@ void store_pack(S* to, const Pack<S, kBytes>& pack) {
   __builtin_memcpy(to, &pack.v, sizeof pack.v);
 }
 
-/// Lane by lane in another precision. GCC 12 takes four instructions for one of __builtin_convertvector
-/// from eight to eight lanes.
+/// Lane by lane in another precision. GCC 12 takes four instructions for one of
+/// __builtin_convertvector from eight to eight lanes.
 template <class To, class From>
 [[gnu::always_inline]] inline To converted(const From& v) {
 #if KERF_PACK_BITS == 512
@@ -131,8 +131,7 @@ inline Pack<float> joined(const Pack<double>& low, const Pack<double>& high) {
   typedef float Half __attribute__((vector_size(kPackBytes / 2)));
   const auto a = converted<Half>(low.v), b = converted<Half>(high.v);
 #if KERF_PACK_BITS == 512
-  return Pack<float>::Vector(
-      _mm512_insertf32x8(_mm512_castps256_ps512(__m256(a)), __m256(b), 1));
+  return Pack<float>::Vector(_mm512_insertf32x8(_mm512_castps256_ps512(__m256(a)), __m256(b), 1));
 #else
   return Pack<float>::Vector(__builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7));
 #endif

@@ -495,13 +495,12 @@ void Range::grow(std::size_t count, bool spare, std::int32_t& end) {
 
 std::size_t PatchedLevel::bytes() const {
   return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) +
-         bytes_of(heads) +
-         bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) + bytes_of(patch_of) +
-         bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) + bytes_of(fixed) +
-         bytes_of(own_point) + bytes_of(home) + bytes_of(copy_point) + bytes_of(copy_vertex) +
-         bytes_of(hanging_point) + bytes_of(hanging_masters) + bytes_of(shared_tiles) +
-         bytes_of(copies_begin) + bytes_of(copies_of) + bytes_of(copy_rows.count) +
-         transfer.bytes() + bytes_of(held) + bytes_of(children);
+         bytes_of(heads) + bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) +
+         bytes_of(patch_of) + bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) +
+         bytes_of(fixed) + bytes_of(own_point) + bytes_of(home) + bytes_of(copy_point) +
+         bytes_of(copy_vertex) + bytes_of(hanging_point) + bytes_of(hanging_masters) +
+         bytes_of(shared_tiles) + bytes_of(copies_begin) + bytes_of(copies_of) +
+         bytes_of(copy_rows.count) + transfer.bytes() + bytes_of(held) + bytes_of(children);
 }
 
 PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,

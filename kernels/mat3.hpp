@@ -304,9 +304,9 @@ KERF_HD Mat3<T> to_scaled_matrix(const Quat<T>& q) {
   const T wx = x2 * q.w, wy = y2 * q.w, wz = z2 * q.w;
   const T ww = q.w * q.w, xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z;
   const T sum = ww + xx, less = ww - xx, other = yy - zz;
-  return {
-      {{sum - (yy + zz), xy - wz, xz + wy}, {xy + wz, less + other, yz - wx},
-       {xz - wy, yz + wx, less - other}}};
+  return {{{sum - (yy + zz), xy - wz, xz + wy},
+           {xy + wz, less + other, yz - wx},
+           {xz - wy, yz + wx, less - other}}};
 }
 
 }  // namespace kerf::kernels

@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numeric>
 #include <vector>
 
 #include "cpu/element_cells.hpp"
+#include "cpu/finest_values.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/patched_level.hpp"
 #include "cpu/stored_matrices.hpp"
@@ -175,6 +177,50 @@ TYPED_TEST(PointsOfPacks, RotationsOfCellsAreThoseOfTheirLanes) {
   expect_lanes([](int k) { return k % 3 == 2 ? -1 : 2 * k; });
   expect_lanes([](int k) { return k == Pack<S>::kLanes - 1 ? 3 : 2 * k; });
   expect_lanes([](int) { return -1; });
+}
+
+// As two numbers of single precision they have 48 bits, and parting the sum again changes nothing.
+TYPED_TEST(PointsOfPacks, RotationsAreStoredAsLanesOrAsPacks) {
+  using S = TypeParam;
+  cpu::FinestRotations<S> lanes, packs;
+  for (auto* rotations : {&lanes, &packs}) rotations->start(1);
+  std::array<std::array<double, 4>, cpu::kGroup> in;
+  for (std::size_t lane = 0; lane < cpu::kGroup; ++lane)
+    for (std::size_t c = 0; c < 4; ++c)
+      in[lane][c] = std::ldexp(std::sin(1.0 + 4.0 * static_cast<double>(lane) + double(c)),
+                               -static_cast<int>(2 * lane));
+  in[3] = {1, 0, 0, 0};
+  in[4][0] = 1 + 0x1p-24 - 0x1p-52;  // nearly in the middle between two
+  in[5][0] = 1 + 0x1p-24;
+
+  for (std::size_t lane = 0; lane < cpu::kGroup; ++lane) lanes.put(lane, in[lane]);
+  for (int first = 0; first < cpu::kGroup; first += Pack<double>::kLanes) {
+    kernels::Quat<Pack<double>> q;
+    Pack<double>* const of[] = {&q.w, &q.x, &q.y, &q.z};
+    for (int k = 0; k < Pack<double>::kLanes; ++k)
+      for (std::size_t c = 0; c < 4; ++c) of[c]->set(k, in[std::size_t(first + k)][c]);
+    packs.store(0, first, q);
+    const auto back = packs.template load<double>(0, first);
+    const Pack<double>* const read[] = {&back.w, &back.x, &back.y, &back.z};
+    for (int k = 0; k < Pack<double>::kLanes; ++k)
+      for (std::size_t c = 0; c < 4; ++c)
+        EXPECT_EQ((*read[c])[k], lanes.at(std::size_t(first + k))[c]);
+  }
+
+  for (std::size_t lane = 0; lane < cpu::kGroup; ++lane) {
+    const auto out = lanes.at(lane);
+    EXPECT_EQ(packs.at(lane), out);
+    for (std::size_t c = 0; c < 4; ++c) {
+      const S rounded = *(lanes.of(lane) + cpu::kGroup * c);
+      EXPECT_LE(std::abs(out[c] - in[lane][c]), 0x1p-48 * std::abs(in[lane][c]));
+      EXPECT_LE(std::abs(double(rounded) - in[lane][c]), 0x1p-24 * std::abs(in[lane][c]));
+      EXPECT_EQ(lanes.template component<S>(lane, c), rounded);
+    }
+    const S before = *lanes.of(lane);
+    lanes.put(lane, out);
+    EXPECT_EQ(lanes.at(lane), out);
+    EXPECT_EQ(*lanes.of(lane), before);
+  }
 }
 
 TEST(Codes, ComeBackAsTheNearestIntegers) {
