@@ -24,7 +24,7 @@ struct BlockPoints {
   /// At the corners of cells that lie like this.
   template <RowKind kKind>
   void add(const std::uint16_t* points, const kernels::Sym3<Pack<S>> (&b)[8]) const {
-    if constexpr (kKind == kScattered) {
+    if constexpr (run_of(kKind) == 1) {  // pairs take longer: two records of each point follow
       for (int i = 0; i < 8; ++i) add(points + kGroup * i, b[i]);
       return;
     }

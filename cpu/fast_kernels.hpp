@@ -31,7 +31,7 @@ inline constexpr int kRunInPack = std::min(run_of(kKind), Pack<S>::kLanes);
 
 /// The corners of the lanes of a pack. In rows they follow each other along x, so that two of them
 /// are read and written together, and no numbers but the first of a row are: `points` is of
-/// PatchedLevel::heads there, else of its corners.
+/// PatchedLevel::heads there, else of its corners. Of pairs each lane's left ones are read.
 /// Inlined, since arrays of packs that a call fills are cleared before.
 template <RowKind kKind, class S>
 [[gnu::always_inline]] inline void gather_corners(const std::uint16_t* points, const S* x,
@@ -41,6 +41,8 @@ template <RowKind kKind, class S>
     if constexpr (kKind == kScattered) {
       gather_points(x, points + kGroup * i, out[i]);
       gather_points(x, points + kGroup * (i + 1), out[i + 1]);
+    } else if constexpr (kKind == kPairs) {
+      gather_pairs(x, points + kGroup * i, out[i], out[i + 1]);
     } else {
       gather_runs<kRunInPack<kKind, S>>(x, points + 4 * edge, out[i], out[i + 1]);
     }
@@ -54,6 +56,8 @@ template <RowKind kKind, class S>
     if constexpr (kKind == kScattered) {
       add_to_points(y, points + kGroup * i, f[i]);
       add_to_points(y, points + kGroup * (i + 1), f[i + 1]);
+    } else if constexpr (kKind == kPairs) {
+      add_pairs(y, points + kGroup * i, f[i], f[i + 1]);
     } else {
       add_runs<kRunInPack<kKind, S>>(y, points + 4 * edge, f[i], f[i + 1]);
     }
@@ -64,7 +68,7 @@ template <RowKind kKind, class S>
 template <class S, class Body>
 void for_corners(const PatchedLevel& level, std::size_t group, const Body& body) {
   const auto run = [&](auto kind) {
-    constexpr bool in_rows = kind() != kScattered;
+    constexpr bool in_rows = run_of(kind()) > 1;
     constexpr std::size_t kPoints = in_rows ? kHeads : 8 * kGroup, kAhead = in_rows ? 16 : 4;
     const auto& all = in_rows ? level.heads : level.corners;
     const std::uint16_t* const points = all.data() + kPoints * group;
@@ -78,6 +82,8 @@ void for_corners(const PatchedLevel& level, std::size_t group, const Body& body)
       return run(std::integral_constant<RowKind, kTwoRows>{});
     case kFourRows:
       return run(std::integral_constant<RowKind, kFourRows>{});
+    case kPairs:
+      return run(std::integral_constant<RowKind, kPairs>{});
     default:
       return run(std::integral_constant<RowKind, kScattered>{});
   }

@@ -167,6 +167,8 @@ template <bool to_write = false, class S>
 //   gather_points    one vector of each lane's point
 //   for_records      body(lane, record) for the vectors of the lanes, in the order of the lanes
 //   gather_in_order  the points from one on, one in each lane
+//   gather_pairs     each lane's point, and the one behind it
+//   add_pairs        adds to these, in the order of the lanes, which may meet in a point
 //   gather_runs<n>   the left and right ends of cells in rows of n: a lane has the points k and
 //                    k + 1 where the lane before has k - 1 and k. `points` has the first point of
 //                    every fourth lane; that of the first one in each row is read

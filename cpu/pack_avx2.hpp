@@ -206,6 +206,57 @@ inline void gather_in_order(const S* records, kernels::Vec3<Pack<S>>& out) {
   gather_points(records, kOrder, out);
 }
 
+inline void gather_pairs(const float* x, const std::uint16_t* at, kernels::Vec3<Pack<float>>& left,
+                         kernels::Vec3<Pack<float>>& right) {
+  const auto pair = [&](int k) { return _mm256_loadu_ps(x + 4 * std::size_t(at[k])); };
+  kernels::Vec3<Pack<float>> low, high;  // left ends of four lanes, and their right ones
+  transpose(pair(0), pair(1), pair(2), pair(3), low);
+  transpose(pair(4), pair(5), pair(6), pair(7), high);
+  for (int c = 0; c < 3; ++c) {
+    left[c].v = _mm256_permute2f128_ps(__m256(low[c].v), __m256(high[c].v), 0x20);
+    right[c].v = _mm256_permute2f128_ps(__m256(low[c].v), __m256(high[c].v), 0x31);
+  }
+}
+inline void gather_pairs(const double* x, const std::uint16_t* at,
+                         kernels::Vec3<Pack<double>>& left, kernels::Vec3<Pack<double>>& right) {
+  gather_points(x, at, left);
+  gather_points(x + 4, at, right);
+}
+
+[[gnu::always_inline]] inline void add_pairs(float* y, const std::uint16_t* at,
+                                             const kernels::Vec3<Pack<float>>& left,
+                                             const kernels::Vec3<Pack<float>>& right) {
+  const auto low = [](const Pack<float>& l, const Pack<float>& r) {
+    return _mm256_permute2f128_ps(__m256(l.v), __m256(r.v), 0x20);
+  };
+  const auto high = [](const Pack<float>& l, const Pack<float>& r) {
+    return _mm256_permute2f128_ps(__m256(l.v), __m256(r.v), 0x31);
+  };
+  __m256 r[4];
+  const auto add = [&](int first) {
+    for (int i = 0; i < 4; ++i) {
+      float* const to = y + 4 * std::size_t(at[first + i]);
+      _mm256_storeu_ps(to, _mm256_add_ps(_mm256_loadu_ps(to), r[i]));
+    }
+  };
+  transpose(low(left.x, right.x), low(left.y, right.y), low(left.z, right.z), r);
+  add(0);
+  transpose(high(left.x, right.x), high(left.y, right.y), high(left.z, right.z), r);
+  add(4);
+}
+[[gnu::always_inline]] inline void add_pairs(double* y, const std::uint16_t* at,
+                                             const kernels::Vec3<Pack<double>>& left,
+                                             const kernels::Vec3<Pack<double>>& right) {
+  __m256d l[4], r[4];
+  transpose(__m256d(left.x.v), __m256d(left.y.v), __m256d(left.z.v), l);
+  transpose(__m256d(right.x.v), __m256d(right.y.v), __m256d(right.z.v), r);
+  for (int i = 0; i < 4; ++i) {
+    double* const to = y + 4 * std::size_t(at[i]);
+    add_record(to, l[i]);
+    add_record(to + 4, r[i]);
+  }
+}
+
 }  // namespace kerf::cpu
 
 #endif

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "cpu/pack.hpp"
+#include "kernels/unrolled.hpp"
 
 #if KERF_PACK_BITS == 512
 #include <immintrin.h>
@@ -271,6 +272,69 @@ inline void add_runs(double* y, const std::uint16_t* points,
   };
   if constexpr (kRun == 4) add_to(at_lane<kRun>(y, points, 3) + 4, __m256d(record(3)));
   add_to(at_lane<kRun>(y, points, 7) + 4, __m256d(record(7)));
+}
+
+inline void gather_pairs(const float* x, const std::uint16_t* at, kernels::Vec3<Pack<float>>& left,
+                         kernels::Vec3<Pack<float>>& right) {
+  const auto pair = [&](int k) { return _mm256_loadu_ps(x + 4 * std::size_t(at[k])); };
+  const auto two = [&](int k) {
+    return _mm512_insertf32x8(_mm512_castps256_ps512(pair(k)), pair(k + 1), 1);
+  };
+  __m512 l[4], r[4];
+  kernels::unrolled<4>([&](auto i) {
+    const __m512 low = two(4 * i), high = two(4 * i + 2);
+    l[i] = _mm512_shuffle_f32x4(low, high, 0x88);
+    r[i] = _mm512_shuffle_f32x4(low, high, 0xDD);
+  });
+  transpose(l[0], l[1], l[2], l[3], left);
+  transpose(r[0], r[1], r[2], r[3], right);
+}
+inline void gather_pairs(const double* x, const std::uint16_t* at,
+                         kernels::Vec3<Pack<double>>& left, kernels::Vec3<Pack<double>>& right) {
+  const auto pair = [&](int k) { return _mm512_loadu_pd(x + 4 * std::size_t(at[k])); };
+  __m512d l[4], r[4];
+  kernels::unrolled<4>([&](auto i) {
+    const __m512d low = pair(2 * i), high = pair(2 * i + 1);
+    l[i] = _mm512_shuffle_f64x2(low, high, 0x44);
+    r[i] = _mm512_shuffle_f64x2(low, high, 0xEE);
+  });
+  transpose(l[0], l[1], l[2], l[3], left);
+  transpose(r[0], r[1], r[2], r[3], right);
+}
+
+[[gnu::always_inline]] inline void add_pairs(float* y, const std::uint16_t* at,
+                                             const kernels::Vec3<Pack<float>>& left,
+                                             const kernels::Vec3<Pack<float>>& right) {
+  __m512 l[4], r[4];
+  transpose_turned(turned(__m512(left.x.v)), turned(__m512(left.y.v)), turned(__m512(left.z.v)), l);
+  transpose_turned(turned(__m512(right.x.v)), turned(__m512(right.y.v)), turned(__m512(right.z.v)),
+                   r);
+  const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
+  const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+  const auto add = [&](int lane, __m256 pair) {
+    float* const to = y + 4 * std::size_t(at[lane]);
+    _mm256_storeu_ps(to, _mm256_add_ps(_mm256_loadu_ps(to), pair));
+  };
+  kernels::unrolled<4>([&](auto i) {
+    const __m512d a = _mm512_castps_pd(l[i]), b = _mm512_castps_pd(r[i]);
+    const __m512 first = _mm512_castpd_ps(_mm512_permutex2var_pd(a, low, b));
+    const __m512 second = _mm512_castpd_ps(_mm512_permutex2var_pd(a, high, b));
+    add(4 * i, _mm512_castps512_ps256(first));
+    add(4 * i + 1, _mm512_extractf32x8_ps(first, 1));
+    add(4 * i + 2, _mm512_castps512_ps256(second));
+    add(4 * i + 3, _mm512_extractf32x8_ps(second, 1));
+  });
+}
+[[gnu::always_inline]] inline void add_pairs(double* y, const std::uint16_t* at,
+                                             const kernels::Vec3<Pack<double>>& left,
+                                             const kernels::Vec3<Pack<double>>& right) {
+  __m512d l[4], r[4];
+  transpose(__m512d(left.x.v), __m512d(left.y.v), __m512d(left.z.v), l);
+  transpose(__m512d(right.x.v), __m512d(right.y.v), __m512d(right.z.v), r);
+  kernels::unrolled<4>([&](auto i) {
+    add_to(y + 4 * std::size_t(at[2 * i]), _mm512_shuffle_f64x2(l[i], r[i], 0x44));
+    add_to(y + 4 * std::size_t(at[2 * i + 1]), _mm512_shuffle_f64x2(l[i], r[i], 0xEE));
+  });
 }
 
 }  // namespace kerf::cpu

@@ -78,6 +78,25 @@ void add_runs(S* y, const std::uint16_t* points, const kernels::Vec3<Pack<S>>& l
   }
 }
 
+template <class S>
+void gather_pairs(const S* x, const std::uint16_t* at, kernels::Vec3<Pack<S>>& left,
+                  kernels::Vec3<Pack<S>>& right) {
+  gather_points(x, at, left);
+  gather_points(x + 4, at, right);
+}
+
+template <class S>
+void add_pairs(S* y, const std::uint16_t* at, const kernels::Vec3<Pack<S>>& left,
+               const kernels::Vec3<Pack<S>>& right) {
+  for (int i = 0; i < Pack<S>::kLanes; ++i) {
+    S* const to = y + 4 * std::size_t(at[i]);
+    for (int c = 0; c < 3; ++c) {
+      to[c] += left[c][i];
+      to[4 + c] += right[c][i];
+    }
+  }
+}
+
 }  // namespace kerf::cpu
 
 #endif

@@ -96,12 +96,18 @@ class Grouping {
     }
   }
 
+  /// Whether the right end of each edge along x is the point behind the left one.
+  static bool is_paired(const Corners& of) {
+    for (std::size_t i = 0; i < 8; i += 2)
+      if (of[i + 1] != of[i] + 1) return false;
+    return true;
+  }
   /// Whether the points of the next cell continue those of cell n along x.
   bool continues(std::size_t n) const {
     const Corners &a = corners_[n], &b = corners_[n + 1];
     for (std::size_t i = 0; i < 8; i += 2)
-      if (a[i + 1] != a[i] + 1 || b[i] != a[i + 1] || b[i + 1] != b[i] + 1) return false;
-    return true;
+      if (b[i] != a[i + 1]) return false;
+    return is_paired(a) && is_paired(b);
   }
 
   /// What is left of whole groups goes to the next kind of them.
@@ -118,7 +124,7 @@ class Grouping {
       while (run < kGroup && i + run < end && continues(i + run - 1)) ++run;
       for (std::size_t k = 0; k < run; ++k) {
         if (run == kGroup)
-          put(i + k, kind, kRow);
+          put(i + k, kind);
         else if (k < run / kHalf * kHalf)
           halves.push_back(i + k);
         else
@@ -128,21 +134,24 @@ class Grouping {
     }
     pass_on(halves, quarters);
     pass_on(quarters, rest);
-    for (const std::size_t n : halves) put(n, kind, kTwoRows);
-    for (const std::size_t n : quarters) put(n, kind, kFourRows);
-    const auto fold = [&](std::size_t n) { return level_.fold[cells_[n]]; };
+    for (const std::size_t n : halves) put(n, kind);
+    for (const std::size_t n : quarters) put(n, kind);
+    // Octants are part of a fold, so that cells side by side, which would add to a point one right
+    // after the other, lie apart.
+    const auto order = [&](std::size_t n) {
+      return std::pair(!is_paired(corners_[n]), level_.fold[cells_[n]]);
+    };
     std::stable_sort(rest.begin(), rest.end(),
-                     [&](std::size_t a, std::size_t b) { return fold(a) < fold(b); });
-    for (const std::size_t n : rest) put(n, kind, kScattered);
+                     [&](std::size_t a, std::size_t b) { return order(a) < order(b); });
+    for (const std::size_t n : rest) put(n, kind);
     while (draft_.cells.size() % kGroup != 0) draft_.cells.push_back(-1);
     index_.resize(draft_.cells.size());
   }
 
-  void put(std::size_t n, std::uint16_t kind, RowKind row) {
+  void put(std::size_t n, std::uint16_t kind) {
     const std::size_t k = draft_.cells.size() % kGroup, group = draft_.cells.size() / kGroup;
     if (k == 0) {
       draft_.kind.push_back(kind);
-      draft_.row.push_back(row);
       draft_.folded.push_back(0);
       draft_.corners.resize(draft_.corners.size() + 8 * kGroup, kNothing);
     }
@@ -299,6 +308,20 @@ void Numbering::sort(Draft& draft) {
   for (auto& masters : draft.masters)
     for (std::uint16_t& m : masters)
       if (m >= draft.first_point) m = rank_[m - draft.first_point];
+  sort_hanging(draft);
+}
+
+/// Those on edges first, which are worked on otherwise: processors foresee what comes next.
+void Numbering::sort_hanging(Draft& draft) {
+  using Hanging = std::pair<std::uint16_t, std::array<std::uint16_t, 4>>;
+  std::vector<Hanging> all;
+  all.reserve(draft.masters.size());
+  for (std::size_t n = 0; n < draft.masters.size(); ++n)
+    all.emplace_back(draft.hanging_point[n], draft.masters[n]);
+  std::stable_partition(all.begin(), all.end(),
+                        [](const Hanging& h) { return h.second[0] == h.second[1]; });
+  for (std::size_t n = 0; n < all.size(); ++n)
+    std::tie(draft.hanging_point[n], draft.masters[n]) = all[n];
 }
 
 RowKind row_kind(const std::uint16_t* corners) {
@@ -306,10 +329,13 @@ RowKind row_kind(const std::uint16_t* corners) {
   for (int i = 0; i < 8; i += 2)
     for (int k = 0; k < kGroup; ++k) {
       const std::uint16_t *a = corners + kGroup * i, *b = a + kGroup;
-      if (b[k] != a[k] + 1) return kScattered;
-      if (k == 0 || a[k] == b[k - 1]) continue;
-      if (k % kQuarter != 0) return kScattered;
-      best = std::min(best, k % kHalf != 0 ? kFourRows : kTwoRows);
+      const bool none = a[k] == kNothing && b[k] == kNothing;
+      if (!none && b[k] != a[k] + 1) return kScattered;
+      if (!none && (k == 0 || a[k] == b[k - 1])) continue;
+      const RowKind most = none || k % kQuarter != 0 ? kPairs
+                           : k % kHalf != 0          ? kFourRows
+                                                     : kTwoRows;
+      best = std::min(best, most);
     }
   return best;
 }

@@ -26,16 +26,15 @@ struct Draft {
 
   std::int32_t patch = 0;
   bool anew = true;
-  std::int32_t first_point = 1, new_points = 0;  // 0 is kNothing
-  std::vector<std::int32_t> cells;               // to be grouped; then per lane, -1: none
-  std::vector<std::uint16_t> kind_of;            // of the cells to be grouped
-  std::vector<std::uint16_t> corners;            // [group][8][kGroup]
-  std::vector<std::uint16_t> slots;              // the same, of the groups that are folded
-  std::vector<std::uint8_t> folded;              // per group
-  std::vector<std::uint8_t> row;                 // per group
-  std::vector<std::uint16_t> kind;               // per group
-  std::vector<std::int32_t> vertices;            // of the level, that come to the patch
-  std::vector<std::uint16_t> vertex_point;       // rising, but for those that were there before
+  std::int32_t first_point = kNothings, new_points = 0;
+  std::vector<std::int32_t> cells;          // to be grouped; then per lane, -1: none
+  std::vector<std::uint16_t> kind_of;       // of the cells to be grouped
+  std::vector<std::uint16_t> corners;       // [group][8][kGroup]
+  std::vector<std::uint16_t> slots;         // the same, of the groups that are folded
+  std::vector<std::uint8_t> folded;         // per group
+  std::vector<std::uint16_t> kind;          // per group
+  std::vector<std::int32_t> vertices;       // of the level, that come to the patch
+  std::vector<std::uint16_t> vertex_point;  // rising, but for those that were there before
   std::vector<std::uint16_t> hanging_point;
   std::vector<std::array<std::uint16_t, 4>> masters;
 
@@ -108,6 +107,7 @@ class Numbering {
   Corners corners_of(Draft& draft, std::int32_t cell, const Corners& slots);
   std::int32_t next(const Draft& draft) const;
   void sort(Draft& draft);
+  static void sort_hanging(Draft& draft);
 
   const PatchedLevel& patched_;
   const Level& level_;
@@ -122,7 +122,7 @@ class Numbering {
 /// Groups and numbers the cells of a draft.
 void make_draft(const Level& level, Draft& draft, Numbering& numbering);
 
-/// How the points of a group lie: [8][kGroup] of corners.
+/// How the points of a group lie: [8][kGroup] of corners. Lanes without a cell are pairs.
 RowKind row_kind(const std::uint16_t* corners);
 
 /// A number along a curve that stays within cubes.

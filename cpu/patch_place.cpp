@@ -221,7 +221,7 @@ void PatchPlacer::fit_ranges() {
       patch.groups.size = patch.copies.size = patch.hanging.size = patch.folded.size = 0;
     draft.before = patch;
     // Cuts bring parts of cells to stored levels, and copies to all.
-    patch.groups.grow(draft.row.size(), finer_ != nullptr, groups);
+    patch.groups.grow(draft.kind.size(), finer_ != nullptr, groups);
     patch.copies.grow(shared, true, copies);
     patch.hanging.grow(draft.masters.size(), false, hanging);
     patch.folded.grow(draft.slots.size() / (8 * kGroup) + draft.folding, false, folded);

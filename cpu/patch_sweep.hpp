@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstring>
 #include <new>
@@ -163,7 +164,7 @@ class PatchPoints {
       for_packs<S>([&](int first) { put_points(x_, own_points(at, first), own(at, first)); });
     load_copies(u);
     interpolate_hanging();
-    std::fill_n(x_ + 4 * std::size_t(kNothing), 4, S(0));
+    std::fill_n(x_ + 4 * std::size_t(kNothing), 4 * kNothings, S(0));
   }
   /// Zero in y, which is not there before.
   void start_sums() {
@@ -212,7 +213,7 @@ class PatchPoints {
   [[gnu::noinline]] void load_copies(const From* u) {
     const std::int32_t* const vertex = level_.copy_vertex.data();
     const std::uint16_t* const point = level_.copy_point.data();
-    for (std::int32_t k = patch_.copies.first; k < patch_.copies.end(); ++k) {
+    for (std::int32_t k = patch_.copies.first, end = patch_.copies.end(); k < end; ++k) {
       const From* from = u + scalar_of(vertex[k]);
       S* to = x_ + 4 * std::size_t(point[k]);
       to[0] = static_cast<S>(from[0]);
@@ -222,21 +223,44 @@ class PatchPoints {
     }
   }
 
+  // Of the four masters of a point on an edge, each counts twice.
+  static bool is_on_edge(const std::array<std::uint16_t, 4>& masters) {
+    return masters[0] == masters[1];
+  }
   void interpolate_hanging() {
-    for (std::int32_t h = patch_.hanging.first; h < patch_.hanging.end(); ++h) {
+    const auto* const masters_of = level_.hanging_masters.data();  // writing may not change them
+    const std::uint16_t* const points = level_.hanging_point.data();
+    for (std::int32_t h = patch_.hanging.first, end = patch_.hanging.end(); h < end; ++h) {
+      const auto& masters = masters_of[h];
+      const std::uint16_t point = points[h];
       R of[4];
-      for (std::size_t k = 0; k < 4; ++k) read(x_, level_.hanging_masters[h][k], of[k]);
-      write(x_, level_.hanging_point[h], S(0.25) * ((of[0] + of[1]) + (of[2] + of[3])));
+      read(x_, masters[0], of[0]);
+      read(x_, masters[2], of[2]);
+      if (is_on_edge(masters)) {
+        write(x_, point, S(0.5) * (of[0] + of[2]));
+        continue;
+      }
+      read(x_, masters[1], of[1]);
+      read(x_, masters[3], of[3]);
+      write(x_, point, S(0.25) * ((of[0] + of[1]) + (of[2] + of[3])));
     }
   }
   void gather_hanging() {
-    for (std::int32_t h = patch_.hanging.first; h < patch_.hanging.end(); ++h) {
-      R share, sum;
-      read(y_, level_.hanging_point[h], share);
-      share *= S(0.25);
-      for (const std::uint16_t m : level_.hanging_masters[h]) {
-        read(y_, m, sum);
-        write(y_, m, sum + share);
+    const auto add = [&](std::uint16_t point, const R& share) {
+      R sum;
+      read(y_, point, sum);
+      write(y_, point, sum + share);
+    };
+    const auto* const masters_of = level_.hanging_masters.data();
+    const std::uint16_t* const points = level_.hanging_point.data();
+    for (std::int32_t h = patch_.hanging.first, end = patch_.hanging.end(); h < end; ++h) {
+      const auto& masters = masters_of[h];
+      R sum;
+      read(y_, points[h], sum);
+      if (is_on_edge(masters)) {
+        for (std::size_t k = 0; k < 4; k += 2) add(masters[k], S(0.5) * sum);
+      } else {
+        for (const std::uint16_t m : masters) add(m, S(0.25) * sum);
       }
     }
   }

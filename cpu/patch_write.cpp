@@ -26,10 +26,13 @@ void PatchWriter::write() {
   if (!draft_.anew) drop_hanging();
   std::sort(touched_.begin(), touched_.end());
   touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-  for (const std::int32_t g : touched_) {
-    out_.row[g] = row_kind(out_.corners.data() + 8 * kGroup * static_cast<std::size_t>(g));
-    out_.set_heads(static_cast<std::size_t>(g));
-  }
+  for (const std::int32_t g : touched_) set_row(g);
+}
+
+void PatchWriter::set_row(std::int32_t g) {
+  const auto group = static_cast<std::size_t>(g);
+  out_.row[g] = row_kind(out_.corners.data() + 8 * kGroup * group);
+  out_.set_heads(group);
 }
 
 void PatchWriter::move_ranges() {
@@ -95,7 +98,7 @@ void PatchWriter::add_groups() {
   std::int32_t end = patch_.groups.first + draft_.before.groups.size;
   next_block_ = patch_.folded.first + draft_.before.folded.size;
   std::size_t used = 0, block = 0;
-  for (std::size_t n = 0; n < draft_.row.size(); ++n) {
+  for (std::size_t n = 0; n < draft_.kind.size(); ++n) {
     const std::int32_t g = used < empty_.size() ? empty_[used++] : end++;
     const auto copy = [&](const auto& from, std::size_t at, std::ptrdiff_t width, std::int32_t to,
                           auto& array) {
@@ -105,8 +108,7 @@ void PatchWriter::add_groups() {
     copy(draft_.cells, n, kGroup, g, out_.cell);
     copy(draft_.corners, n, 8 * kGroup, g, out_.corners);
     out_.kind[g] = draft_.kind[n];
-    out_.row[g] = draft_.row[n];
-    out_.set_heads(static_cast<std::size_t>(g));
+    set_row(g);
     out_.patch_of[g] = draft_.patch;
     out_.slots_at[g] = -1;
     if (draft_.folded[n] != 0) {

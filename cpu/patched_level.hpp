@@ -8,7 +8,7 @@
 // alone, or
 //           shared ones; one that was shared stays so. Vectors are [tile][component][kGroup]. What
 //           is left of a tile is nothing, which is zero and stays so.
-// Points    of a patch: first one that is nothing, then its vertices and its hanging corners by
+// Points    of a patch: first two that are nothing, then its vertices and its hanging corners by
 //           place, with gaps before long rows, then those that came with cuts. A hanging corner is
 //           the mean of four of the points (each of two counts twice on an edge).
 // Cells     in groups of kGroup, one in each lane; a lane without a cell has the point that is
@@ -44,8 +44,10 @@ inline constexpr int kGroup = 16;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
 /// First points of quarters of a group, along four edges of its cells: PatchedLevel::heads.
 inline constexpr std::size_t kHeads = 16;
-/// The point of every patch that is nothing: zero, and never read.
+/// The point of every patch that is nothing: zero, and never read; and how many there are, so that
+/// a pair of points can be nothing.
 inline constexpr std::uint16_t kNothing = 0;
+inline constexpr std::int32_t kNothings = 2;
 
 /// How the matrix of a cell of a stored level comes about; cells of a group are alike.
 enum StoredKind : std::uint16_t {
@@ -83,13 +85,14 @@ enum HeldCell : std::uint8_t { kFree, kPartlyHeld, kWhollyHeld };
 /// How the points of a group lie.
 enum RowKind : std::uint8_t {
   kScattered,
+  kPairs,     ///< the right end of each edge along x is the point behind the left one
   kFourRows,  ///< each quarter of the group is a row: cells side by side along x, points in order
   kTwoRows,   ///< each half is
   kRow        ///< the whole group is one
 };
 /// Cells in a row of such a group; 1 where there are none.
 constexpr int run_of(RowKind kind) {
-  return kind == kScattered  ? 1
+  return kind <= kPairs      ? 1
          : kind == kFourRows ? kGroup / 4
          : kind == kTwoRows  ? kGroup / 2
                              : kGroup;

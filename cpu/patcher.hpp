@@ -82,6 +82,7 @@ class PatchWriter {
   void fold_group(std::int32_t group);
   void add_points();
   void drop_hanging();
+  void set_row(std::int32_t group);
 
   const Level& level_;
   Draft& draft_;

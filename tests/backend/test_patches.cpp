@@ -43,13 +43,19 @@ TEST(Patches, AreWholeWhenMade) {
   const Problem p = cut_octree(true);
   const std::vector<PatchedLevel> levels = patches_of(p.hierarchy, 1);
   test::expect_whole(levels);
-  int hanging = 0, in_rows = 0;
+  int hanging = 0, in_rows = 0, paired = 0, scattered = 0;  // cells, but for hanging points
   for (const PatchedLevel& l : levels) {
     hanging += static_cast<int>(l.hanging_point.size());
-    for (const std::uint8_t row : l.row) in_rows += row != cpu::kScattered ? kGroup : 0;
+    for (const std::uint8_t row : l.row) {
+      in_rows += cpu::run_of(cpu::RowKind(row)) > 1 ? kGroup : 0;
+      paired += row == cpu::kPairs ? kGroup : 0;
+      scattered += row == cpu::kScattered ? kGroup : 0;
+    }
   }
   EXPECT_GT(hanging, 100);
   EXPECT_GT(in_rows, 800);
+  EXPECT_GT(paired, 800);
+  EXPECT_GT(scattered, 100);
   EXPECT_GT(levels[0].patches.size(), 4u);
   EXPECT_TRUE(std::any_of(levels[1].kind.begin(), levels[1].kind.end(), cpu::is_of_eight));
   EXPECT_GT(levels[0].shared, 100);

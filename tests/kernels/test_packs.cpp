@@ -139,6 +139,37 @@ TYPED_TEST(PointsOfPacks, OfRowsAreReadAndAddedToTogether) {
 }
 
 /// Cells with other rotations, by their numbers: [group][component][kGroup].
+// Of lanes that meet in a point, and of one that has none.
+TYPED_TEST(PointsOfPacks, AreReadAndAddedToAsPairs) {
+  using S = TypeParam;
+  constexpr int kLanes = Pack<S>::kLanes;
+  std::array<std::uint16_t, kLanes> at;
+  for (int k = 0; k < kLanes; ++k) at[k] = static_cast<std::uint16_t>(2 + (23 * k + 5) % 17);
+  at[1] = cpu::kNothing;
+  at[kLanes - 1] = static_cast<std::uint16_t>(at[0] + 1);
+  const Records<S> x(3), before(1);
+  Records<S> y(1);
+  Vec3<Pack<S>> left, right;
+  const Vec3<Pack<S>> f = numbers<S>(1), g = numbers<S>(5);
+
+  cpu::gather_pairs(x.s, at.data(), left, right);
+  cpu::add_pairs(y.s, at.data(), f, g);
+
+  std::array<std::array<S, 3>, 64> sum{};
+  for (int k = 0; k < kLanes; ++k)
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(left[c][k], x.at(at[k], c));
+      EXPECT_EQ(right[c][k], x.at(at[k] + 1, c));
+      sum[at[k]][c] += f[c][k];
+      sum[at[k] + 1][c] += g[c][k];
+    }
+  for (int p = 0; p < 64; ++p) {
+    for (int c = 0; c < 3; ++c)  // small integers: exact in any order
+      EXPECT_EQ(y.at(p, c), before.at(p, c) + sum[p][c]) << "point " << p;
+    EXPECT_EQ(y.at(p, 3), S(0)) << "point " << p;
+  }
+}
+
 template <class S>
 struct NumberedCells {
   std::vector<S> all = std::vector<S>(4 * cpu::kGroup * 4);

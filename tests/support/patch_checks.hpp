@@ -138,14 +138,21 @@ inline void expect_slots(const PatchedLevel& l) {
   });
 }
 
-/// The points of a row follow each other: of the whole group, or of halves or quarters of it.
+/// The points of a row follow each other: of the whole group, or of halves or quarters of it, or of
+/// edges along x.
 inline void expect_rows(const PatchedLevel& l) {
   for_groups(l, [&](std::int32_t, std::size_t g) {
     const std::uint16_t* corners = l.corners.data() + 8 * kGroup * g;
-    if (l.row[g] == cpu::kScattered) return;
+    bool paired = true;
+    for (int n = 0; n < 8 * kGroup; ++n)
+      if (const int i = n / kGroup, k = n % kGroup; i % 2 == 0 && l.cell[kGroup * g + k] >= 0)
+        paired = paired && corners[kGroup * (i + 1) + k] == corners[kGroup * i + k] + 1;
+    EXPECT_EQ(l.row[g] != cpu::kScattered, paired);
+    if (!paired) return;
     const int run = cpu::run_of(cpu::RowKind(l.row[g]));
     for (int i = 0; i < 8; i += 2)
       for (int k = 0; k < kGroup; ++k) {
+        if (run == 1 && l.cell[kGroup * g + k] < 0) continue;
         EXPECT_EQ(corners[kGroup * (i + 1) + k], corners[kGroup * i + k] + 1);
         if (k % run != 0) {
           EXPECT_EQ(corners[kGroup * i + k], corners[kGroup * i + k - 1] + 1);
