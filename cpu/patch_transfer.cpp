@@ -227,7 +227,8 @@ TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, Tran
     // What ends a run soon ends those soon that start within it.
     for (const std::size_t stop = n + std::max<std::size_t>(run.size, 1); n < stop; ++n) {
       const Row one = row(n);
-      terms.push_back(static_cast<std::uint8_t>(one.count));
+      const bool alike = one.count > 0 && one.has_weights(static_cast<int>(kUnit) / one.count);
+      terms.push_back(static_cast<std::uint8_t>(one.count + (alike ? Transfer::kMean : 0)));
       out.term_point.insert(out.term_point.end(), one.point, one.point + one.count);
       out.term_weight.insert(out.term_weight.end(), one.weight, one.weight + one.count);
       (one.count > 0 ? block.others : block.gaps) = true;

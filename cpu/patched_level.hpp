@@ -165,6 +165,8 @@ struct TransferBlock {
 
 /// Between the vertices of a level and of the next.
 struct Transfer {
+  static constexpr std::uint8_t kMean = 16;  // more than the terms of any vertex
+
   std::vector<TransferPart> parts;   // per patch
   std::vector<std::int32_t> point;   // the vertex of the next level, in its own numbers
   std::vector<TransferBlock> tiles;  // of own vertices
@@ -172,7 +174,7 @@ struct Transfer {
   Array<TransferRun> runs;
   Array<std::uint16_t> term_point;  // within the part
   Array<std::uint8_t> term_weight;  // 64ths: exact
-  std::vector<std::uint8_t> terms;  // per packed vertex: how many, 0 in runs
+  std::vector<std::uint8_t> terms;  // per packed vertex: how many, 0 in runs; kMean: all alike
   std::vector<std::int32_t> lead;   // packed
   std::vector<std::uint8_t> lead_terms;
   std::vector<std::int32_t> giver_begin, givers;  // per vertex of the next level: its points

@@ -186,6 +186,35 @@ class TransferPoints {
       }
     }
   }
+  /// body(count as a type), if all terms of a vertex are alike and as many as in a grid.
+  template <class Body>
+  static bool for_mean(std::uint8_t terms, const Body& body) {
+    switch (terms) {
+      case Transfer::kMean + 1:
+        body(std::integral_constant<int, 1>{});
+        return true;
+      case Transfer::kMean + 2:
+        body(std::integral_constant<int, 2>{});
+        return true;
+      case Transfer::kMean + 4:
+        body(std::integral_constant<int, 4>{});
+        return true;
+      case Transfer::kMean + 8:
+        body(std::integral_constant<int, 8>{});
+        return true;
+      default:
+        return false;
+    }
+  }
+  /// The mean of some points, in pairs.
+  template <int n>
+  void mean_of(const std::uint16_t* point, R& out) const {
+    R of[n];
+    for (int i = 0; i < n; ++i) read(x_, point[i], of[i]);
+    for (int half = n / 2; half > 0; half /= 2)
+      for (int i = 0; i < half; ++i) of[i] += of[i + half];
+    out = S(1) / S(n) * of[0];
+  }
   void take_others(const TransferBlock& block, const std::uint8_t* terms, int count) {
     const auto first = static_cast<std::size_t>(block.first_term);
     const std::uint16_t* point = transfer_.term_point.data() + first;
@@ -193,11 +222,15 @@ class TransferPoints {
     for (int k = 0; k < count; ++k) {
       if (terms[k] == 0) continue;
       R sum{}, one;
-      for (int n = 0; n < terms[k]; ++n) {
-        read(x_, *point++, one);
-        sum += weights_[*weight++] * one;
-      }
+      const int size = terms[k] % Transfer::kMean;
+      if (!for_mean(terms[k], [&](auto n) { mean_of<n()>(point, sum); }))
+        for (int n = 0; n < size; ++n) {
+          read(x_, point[n], one);
+          sum += weights_[weight[n]] * one;
+        }
       write(rows_, static_cast<std::size_t>(k), sum);
+      point += size;
+      weight += size;
     }
   }
 
@@ -236,9 +269,18 @@ class TransferPoints {
     const std::uint16_t* point = transfer_.term_point.data() + first;
     const std::uint8_t* weight = transfer_.term_weight.data() + first;
     for (int k = 0; k < count; ++k) {
+      if (terms[k] == 0) continue;
       R from;
       read(rows_, static_cast<std::size_t>(k), from);
-      for (int n = 0; n < terms[k]; ++n) add(to, *point++, weights_[*weight++] * from);
+      const int size = terms[k] % Transfer::kMean;
+      const bool done = for_mean(terms[k], [&](auto n) {
+        const R share = S(1) / S(n()) * from;
+        for (int i = 0; i < n(); ++i) add(to, point[i], share);
+      });
+      if (!done)
+        for (int n = 0; n < size; ++n) add(to, point[n], weights_[weight[n]] * from);
+      point += size;
+      weight += size;
     }
   }
 

@@ -288,8 +288,13 @@ void read_block(const cpu::Transfer& t, const cpu::TransferBlock& block, int cou
       EXPECT_EQ(terms[k], 0);
       continue;
     }
-    for (int n = 0; n < terms[k]; ++n, ++term)
+    const int size = terms[k] % cpu::Transfer::kMean;
+    bool alike = size > 0;
+    for (int n = 0; n < size; ++n, ++term) {
       add(*row, t.term_point[term], static_cast<float>(t.term_weight[term]) / 64);
+      alike = alike && size * t.term_weight[term] == 64;
+    }
+    EXPECT_EQ(terms[k] >= cpu::Transfer::kMean, alike);
   }
   EXPECT_EQ(block.others, others);
   EXPECT_EQ(block.gaps, gaps);
