@@ -38,7 +38,7 @@ inline void gather_gradients(const PatchedLevel& level, std::size_t group, const
 }
 
 /// Newton's iteration in single precision, from and to batch.near. A lane that it does not lead
-/// anywhere is left to turned_pack.
+/// anywhere is left to turn_on.
 KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
   using P = Pack<float>;
   using T = Twin<P>;
