@@ -37,8 +37,17 @@ inline void gather_gradients(const PatchedLevel& level, std::size_t group, const
                       });
 }
 
+/// q where the mask holds, else next.
+template <class T>
+kernels::Quat<T> held(const typename T::Mask& mask, const kernels::Quat<T>& q,
+                      const kernels::Quat<T>& next) {
+  return {select(mask, q.w, next.w), select(mask, q.x, next.x), select(mask, q.y, next.y),
+          select(mask, q.z, next.z)};
+}
+
 /// Newton's iteration in single precision, from and to batch.near. A lane that it does not lead
-/// anywhere is left to turn_on.
+/// anywhere is left to turn_on; where F is too large for single precision it gets the identity,
+/// from numbers that normalised() finds unusable.
 KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
   using P = Pack<float>;
   using T = Twin<P>;
@@ -54,11 +63,12 @@ KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
     kernels::Quat<P>*const first = batch.near + n, *const second = first + 1;
     kernels::Quat<T> q{
         {first->w, second->w}, {first->x, second->x}, {first->y, second->y}, {first->z, second->z}};
-    for (int i = 0; i < kIterations; ++i) {
+    auto done = T(1) < T(0);  // such lanes stay, so that no lane depends on others
+    for (int i = 0; i < kIterations && !all(done); ++i) {
       kernels::RotationStep<T> step;
       kernels::rotation_step(F, q, step);
-      q = step.next;
-      if (all(!step.ascent || step.length2 <= near2)) break;
+      q = held(done, q, step.next);
+      done = done || !step.ascent || step.length2 <= near2;
     }
     q = kernels::normalised(q);
     *first = {q.w.a, q.x.a, q.y.a, q.z.a};
@@ -66,24 +76,24 @@ KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
   }
 }
 
-/// More steps of a pack. Where Newton proves nothing within its steps, a lane goes the way of the
-/// reference, from `start`.
+/// More steps of the lanes of a pack that are not done. Where Newton proves nothing within its
+/// steps, a lane goes the way of the reference, from `start`.
 [[gnu::noinline, gnu::cold]] inline void turn_on(const kernels::Mat3<Pack<double>>& F,
                                                  const kernels::Quat<Pack<double>>& start,
+                                                 const PackMask<double>& done,
                                                  kernels::Quat<Pack<double>>& q) {
   using P = Pack<double>;
   constexpr int kIterations = 8;
   const P small2 = P(1e-12);
-  PackMask<double> proven{P(1).v < P(0).v}, lost = proven;
+  PackMask<double> proven = done, lost{P(1).v < P(0).v};
   for (int i = 0; i < kIterations && !all(proven || lost); ++i) {
     kernels::RotationStep<P> step;
     kernels::rotation_step(F, q, step);
     lost = lost || !(step.ascent || proven);
-    q = {select(proven, q.w, step.next.w), select(proven, q.x, step.next.x),
-         select(proven, q.y, step.next.y), select(proven, q.z, step.next.z)};
+    q = held(proven, q, step.next);
     proven = proven || (step.ascent && step.length2 <= small2);
   }
-  q = kernels::normalised(q);
+  q = held(done, q, kernels::normalised(q));
   for (int k = 0; k < P::kLanes; ++k) {
     if (proven.v[k] != 0 && lost.v[k] == 0) continue;
     kernels::Mat3<double> f;
@@ -121,7 +131,8 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
   using T = Twin<P>;
   constexpr int kPacks = RotationBatch::kPacks, kHalf = kPacks / 2;
   RotationBatch batch;
-  for (int g = 0; g < RotationBatch::kGroups; ++g) {  // the last one again for those that are not
+  const int gathered = count + kHalf * count % 2;  // the last one twice, for a whole twin
+  for (int g = 0; g < gathered; ++g) {
     const std::size_t group = begin + static_cast<std::size_t>(std::min(g, count - 1));
     rotations.prefetch_to_store(group);
     gather_gradients(level, group, x, batch.gradient + kPacks * g);
@@ -144,10 +155,8 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
     parted(near.z, q.z.a, q.z.b);
     const auto done = take_last_step(both, q);
     kernels::Quat<P> q0{q.w.a, q.x.a, q.y.a, q.z.a}, q1{q.w.b, q.x.b, q.y.b, q.z.b};
-    if (!all(done)) {
-      turn_on(F[0], rotations.template load<double>(group, first), q0);
-      turn_on(F[1], rotations.template load<double>(group, second), q1);
-    }
+    if (!all(done.a)) turn_on(F[0], rotations.template load<double>(group, first), done.a, q0);
+    if (!all(done.b)) turn_on(F[1], rotations.template load<double>(group, second), done.b, q1);
     rotations.store(group, first, q0);
     rotations.store(group, second, q1);
   }

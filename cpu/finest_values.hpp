@@ -29,7 +29,7 @@ struct PackedMaterial {
 };
 
 /// Rotations of the cells of level 0, [group][w x y z][lane]. In single precision with what
-/// rounding left of them: what is asked for in double is the sum of both, to 2^-49 of a component.
+/// rounding left of them: what is asked for in double is the sum of both, to 2^-48 of a component.
 template <class S>
 class FinestRotations {
  public:

@@ -103,6 +103,8 @@ void store_pack(S* to, const Pack<S, kBytes>& pack) {
 template <class To, class From>
 [[gnu::always_inline]] inline To converted(const From& v) {
 #if KERF_PACK_BITS == 512
+  static_assert(std::is_floating_point_v<std::decay_t<decltype(From{}[0])>> &&
+                std::is_floating_point_v<std::decay_t<decltype(To{}[0])>>);
   if constexpr (sizeof(From) == 32 && sizeof(To) == 64) return To(_mm512_cvtps_pd(__m256(v)));
   if constexpr (sizeof(From) == 64 && sizeof(To) == 32) return To(_mm512_cvtpd_ps(__m512d(v)));
 #endif

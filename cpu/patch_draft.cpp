@@ -54,7 +54,7 @@ std::uint64_t key_of(const std::array<std::uint16_t, 4>& sorted) {
 }
 
 /// Cells of a patch in groups. Of each kind those first that make rows as long as a group, then
-/// those in rows of half that length, then of a quarter, then the others by fold.
+/// those in rows of half that length, then of a quarter, then the others: pairs first, by fold.
 class Grouping {
  public:
   Grouping(const Level& level, Draft& draft, Numbering& numbering)

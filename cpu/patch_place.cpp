@@ -100,10 +100,10 @@ void PatchPlacer::find_shared() {
 }
 
 /// New own vertices, in the places that others left where there are such. Where a patch has no room
-/// for all, some take places among the shared ones, where one copy is as good as two: to move it
-/// would be to move all of its vertices in all vectors.
+/// for all, some take places among the shared ones, with one copy: every sweep passes them apart
+/// from now on, but to make room would be to move all vertices of the patch in all vectors.
 void PatchPlacer::place_own(const Draft& draft) {
-  constexpr double kMostShared = 1;  // to one of its own
+  constexpr double kMostShared = 1;  // copies before, and new ones, to a vertex of its own
   std::vector<std::int32_t> fresh, kept;
   for (const std::int32_t v : draft.vertices)
     if (out_.packed[v] == claim(draft.patch)) fresh.push_back(v);

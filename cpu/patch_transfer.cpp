@@ -227,7 +227,9 @@ TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, Tran
     // What ends a run soon ends those soon that start within it.
     for (const std::size_t stop = n + std::max<std::size_t>(run.size, 1); n < stop; ++n) {
       const Row one = row(n);
-      const bool alike = one.count > 0 && one.has_weights(static_cast<int>(kUnit) / one.count);
+      const auto unit = static_cast<int>(kUnit);
+      const bool alike =
+          one.count > 0 && unit % one.count == 0 && one.has_weights(unit / one.count);
       terms.push_back(static_cast<std::uint8_t>(one.count + (alike ? Transfer::kMean : 0)));
       out.term_point.insert(out.term_point.end(), one.point, one.point + one.count);
       out.term_weight.insert(out.term_weight.end(), one.weight, one.weight + one.count);

@@ -44,8 +44,8 @@ inline constexpr int kGroup = 16;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;
 /// First points of quarters of a group, along four edges of its cells: PatchedLevel::heads.
 inline constexpr std::size_t kHeads = 16;
-/// The point of every patch that is nothing: zero, and never read; and how many there are, so that
-/// a pair of points can be nothing.
+/// The point of every patch that is nothing: what is read there is zero, and what is added there
+/// goes nowhere; and how many there are, so that a pair of points can be nothing.
 inline constexpr std::uint16_t kNothing = 0;
 inline constexpr std::int32_t kNothings = 2;
 

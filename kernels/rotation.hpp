@@ -62,7 +62,8 @@ KERF_HD Quat<T> turned_on(const Quat<T>& q, const Vec3<T>& w) {
 /// normalised() behind the last: the next q is sqrt(1 + omega^2 / 4) times as long.
 ///
 /// Needs  |q|^2 F neither so large nor so small that its cube over- or underflows: in single
-///        precision the q of five steps, each from near a half turn, comes close.
+///        precision the q of five steps, each from near a half turn, comes close. Where it is, the
+///        next q may be no number, without ascent.
 template <class T>
 KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& out) {
   // det > 1e-3 tr^3 keeps the smallest eigenvalue above 0.4 % of the trace; at rest the ratio is

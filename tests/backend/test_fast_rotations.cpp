@@ -4,7 +4,9 @@
 // singular value decompositions.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -89,6 +91,55 @@ TEST(FastRotations, AreTheBestForAnyDisplacement) {
     }
   EXPECT_GT(met.inverted, 100);
   EXPECT_GT(met.far_turned, 100);
+}
+
+// A cell among fine ones that takes more steps, or none, or the reference's way; with gradients
+// that single precision, or no number at all, can hold.
+TEST(FastRotations, DependOnNoOtherCell) {
+  const Problem p = uniform_body({19, 7, 5});
+  const Level& finest = p.hierarchy.levels[0];
+  const Vector x = p.deformation();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr std::int32_t kCell = 300;
+  const auto rotations_of = [&](const char* machine, const Vector& of) {
+    const auto backend = test::make_backend(machine);
+    const int u = backend->add_vector();
+    backend->load(p.hierarchy);
+    test::write(*backend, 0, u, of);
+    backend->rotate_cells(u);
+    std::vector<double> q(4 * p.hierarchy.values.size());
+    backend->read_rotations(q);
+    return q;
+  };
+  for (const std::string machine : {"fast", "mixed"}) {
+    const std::vector<double> usual = rotations_of(machine.c_str(), x);
+    for (const double far : {-3.0, 10.0, 1e15, 1e22, kInfinity, std::nan("")}) {
+      SCOPED_TRACE(::testing::Message() << machine << ", " << far);
+      Vector moved = x;
+      const std::int32_t v = finest.slots[kCell][7];
+      moved[3 * v] += far * p.physics.spacing;
+      const std::vector<double> q = rotations_of(machine.c_str(), moved);
+      int others = 0;
+      Met met;
+      for (std::int32_t c = 0; c < finest.cells(); ++c) {
+        const auto& slots = finest.slots[c];
+        const double* const of = q.data() + 4 * c;
+        if (std::find(slots.begin(), slots.end(), v) == slots.end()) {
+          ++others;
+          for (int k = 0; k < 4; ++k) ASSERT_EQ(of[k], usual[static_cast<std::size_t>(4 * c + k)]);
+        } else if (!std::isfinite(far)) {
+          for (int k = 0; k < 4; ++k) ASSERT_EQ(of[k], k == 0 ? 1 : 0) << "where it started";
+        } else if (std::abs(far) < 100) {
+          ASSERT_NO_FATAL_FAILURE(expect_best(gradient_of(p, c, moved), matrix_of(q, c),
+                                              machine == "fast" ? 0x1p-52 : 0x1p-49, met));
+        } else {
+          const Matrix3 R = matrix_of(q, c);
+          ASSERT_LT((R.transpose() * R - Matrix3::Identity()).norm(), 1e-13);
+        }
+      }
+      EXPECT_GT(others, 600);
+    }
+  }
 }
 
 // What is stored in two numbers of single precision has the relative precision of both.

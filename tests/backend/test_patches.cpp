@@ -253,9 +253,11 @@ class Followed {
 
 struct Counts {
   int updates = 0, remade = 0, untouched = 0, divided = 0, changed = 0, added = 0;
+  int alone = 0, moved = 0;
 
   /// Cells that stayed where they were, with other vertices or as they were; and new ones in
-  /// patches most of whose cells stayed.
+  /// patches most of whose cells stayed. New vertices of one patch among the shared ones, for lack
+  /// of room; and patches whose own vertices moved.
   void count(const PatchedLevel& before, const PatchedLevel& now, const LevelChange& change) {
     std::vector<int> stayed(before.patches.size());
     for (std::size_t c = 0; c < before.lane.size(); ++c) {
@@ -269,6 +271,14 @@ struct Counts {
     for (std::int32_t c = change.cells_before; c < now.level->cells(); ++c)
       if (const auto p = std::size_t(now.patch_of_cell(c)); p < stayed.size())
         added += stayed[p] > 0;
+    for (std::int32_t v = change.vertices_before; v < now.level->vertices(); ++v) {
+      const std::int32_t packed = now.packed[v];
+      alone += PatchedLevel::is_shared(now.home[packed / kGroup]) &&
+               now.copies(now.shared_number(packed)).size() == 1;
+    }
+    for (std::size_t n = 0; n < before.patches.size() && now.groups_built == before.groups_built;
+         ++n)
+      moved += before.patches[n].own.first != now.patches[n].own.first;
   }
 };
 
@@ -329,6 +339,8 @@ TEST(Patches, StayWholeUnderCuts) {
   EXPECT_GT(counts.untouched, 1000);
   EXPECT_GT(counts.changed, 1000);
   EXPECT_GT(counts.added, 1000);
+  EXPECT_GT(counts.alone, 1000);
+  EXPECT_GT(counts.moved, 10);
 }
 
 /// A level with cell matrices of noise, and `diagonal` on their diagonal; zero where held.

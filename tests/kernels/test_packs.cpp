@@ -138,7 +138,6 @@ TYPED_TEST(PointsOfPacks, OfRowsAreReadAndAddedToTogether) {
   }
 }
 
-/// Cells with other rotations, by their numbers: [group][component][kGroup].
 // Of lanes that meet in a point, and of one that has none.
 TYPED_TEST(PointsOfPacks, AreReadAndAddedToAsPairs) {
   using S = TypeParam;
@@ -170,6 +169,7 @@ TYPED_TEST(PointsOfPacks, AreReadAndAddedToAsPairs) {
   }
 }
 
+/// Cells with other rotations, by their numbers: [group][component][kGroup].
 template <class S>
 struct NumberedCells {
   std::vector<S> all = std::vector<S>(4 * cpu::kGroup * 4);

@@ -150,6 +150,17 @@ inline void expect_rows(const PatchedLevel& l) {
     EXPECT_EQ(l.row[g] != cpu::kScattered, paired);
     if (!paired) return;
     const int run = cpu::run_of(cpu::RowKind(l.row[g]));
+    int longest = kGroup;  // all cells but the first ones of such runs continue those before
+    const auto continues = [&](int k) {
+      for (int i = 0; i < 8; i += 2)
+        if (corners[kGroup * i + k] != corners[kGroup * (i + 1) + k - 1]) return false;
+      return true;
+    };
+    for (std::size_t k = 0; k < kGroup; ++k)
+      if (l.cell[kGroup * g + k] < 0) longest = 1;
+    for (int k = 1; k < kGroup; ++k)
+      while (longest > 1 && k % longest != 0 && !continues(k)) longest /= 2;
+    EXPECT_EQ(run, longest < 4 ? 1 : longest);
     for (int i = 0; i < 8; i += 2)
       for (int k = 0; k < kGroup; ++k) {
         if (run == 1 && l.cell[kGroup * g + k] < 0) continue;
