@@ -37,6 +37,9 @@ inline void gather_gradients(const PatchedLevel& level, std::size_t group, const
                       });
 }
 
+/// Of the square of a step in double, radians: what follows one of 1e-6 is at most its square.
+inline constexpr double kLastStep2 = 1e-12;
+
 /// q where the mask holds, else next.
 template <class T>
 kernels::Quat<T> held(const typename T::Mask& mask, const kernels::Quat<T>& q,
@@ -84,7 +87,7 @@ KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
                                                  kernels::Quat<Pack<double>>& q) {
   using P = Pack<double>;
   constexpr int kIterations = 8;
-  const P small2 = P(1e-12);
+  const P small2 = P(kLastStep2);
   PackMask<double> proven = done, lost{P(1).v < P(0).v};
   for (int i = 0; i < kIterations && !all(proven || lost); ++i) {
     kernels::RotationStep<P> step;
@@ -111,16 +114,14 @@ KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
 /// The last step, from q of length 1 in single precision; the lanes in which it was the last one.
 template <class T>
 [[gnu::always_inline]] inline auto take_last_step(const kernels::Mat3<T>& F, kernels::Quat<T>& q) {
-  // What follows a step of 1e-6 radians is at most its square; single precision leaves some 1e-7.
-  const T small2 = T(1e-12);
   kernels::RotationStep<T> step;
   kernels::rotation_step(F, q, step);
   q = step.next;
-  // 1 / |q| by its series: |q|^2 - 1 is some 1e-7.
+  // 1 / |q| by its series: |q|^2 - 1 is some 1e-7, and so is what single precision leaves to do.
   const T over = fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, fma(q.z, q.z, T(-1)))));
   const T less = over * fma(over, T(0.375), T(-0.5));
   q = {fma(q.w, less, q.w), fma(q.x, less, q.x), fma(q.y, less, q.y), fma(q.z, less, q.z)};
-  return step.ascent && step.length2 <= small2;
+  return step.ascent && step.length2 <= T(kLastStep2);
 }
 
 /// Rotations of some groups, at most RotationBatch::kGroups, from the displacements.

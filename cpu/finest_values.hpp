@@ -3,7 +3,6 @@
 // What the elements of level 0 are made of: rotations and materials.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -55,12 +54,9 @@ class FinestRotations {
   void put(std::size_t lane, const std::array<double, 4>& q) {
     for (std::size_t k = 0; k < 4; ++k) {
       const std::size_t to = place(lane) + kGroup * k;
-      rounded_[to] = static_cast<S>(q[k]);
-      if constexpr (kHasRest) {
-        const double sum = without_last_bits(q[k]);
-        rounded_[to] = static_cast<S>(sum);
-        rest_[to] = static_cast<S>(sum - static_cast<double>(rounded_[to]));
-      }
+      const double sum = kHasRest ? without_last_bits(q[k]) : q[k];
+      rounded_[to] = static_cast<S>(sum);
+      if constexpr (kHasRest) rest_[to] = static_cast<S>(sum - static_cast<double>(rounded_[to]));
     }
   }
 

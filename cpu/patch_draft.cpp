@@ -37,8 +37,8 @@ std::uint64_t place_key(const Vec3i& p) {
 std::uint64_t row_key(std::uint64_t place) { return place >> 21; }
 
 /// The points that a hanging corner is the mean of.
-std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int corner) {
-  std::array<std::uint16_t, 4> out{};
+HangingMasters masters_of(const Corners& slots, int octant, int corner) {
+  HangingMasters out{};
   std::size_t n = 0;
   for (int j = 0; j < 8; ++j)
     if (kernels::is_between(octant, corner, j)) out[n++] = slots[static_cast<std::size_t>(j)];
@@ -48,7 +48,7 @@ std::array<std::uint16_t, 4> masters_of(const Corners& slots, int octant, int co
 }
 
 /// Names a hanging corner.
-std::uint64_t key_of(const std::array<std::uint16_t, 4>& sorted) {
+std::uint64_t key_of(const HangingMasters& sorted) {
   return std::uint64_t{sorted[0]} | std::uint64_t{sorted[1]} << 16 |
          std::uint64_t{sorted[2]} << 32 | std::uint64_t{sorted[3]} << 48;
 }
@@ -313,13 +313,13 @@ void Numbering::sort(Draft& draft) {
 
 /// Those on edges first, which are worked on otherwise: processors foresee what comes next.
 void Numbering::sort_hanging(Draft& draft) {
-  using Hanging = std::pair<std::uint16_t, std::array<std::uint16_t, 4>>;
+  using Hanging = std::pair<std::uint16_t, HangingMasters>;
   std::vector<Hanging> all;
   all.reserve(draft.masters.size());
   for (std::size_t n = 0; n < draft.masters.size(); ++n)
     all.emplace_back(draft.hanging_point[n], draft.masters[n]);
   std::stable_partition(all.begin(), all.end(),
-                        [](const Hanging& h) { return h.second[0] == h.second[1]; });
+                        [](const Hanging& h) { return is_on_edge(h.second); });
   for (std::size_t n = 0; n < all.size(); ++n)
     std::tie(draft.hanging_point[n], draft.masters[n]) = all[n];
 }

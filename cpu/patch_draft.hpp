@@ -36,7 +36,7 @@ struct Draft {
   std::vector<std::int32_t> vertices;       // of the level, that come to the patch
   std::vector<std::uint16_t> vertex_point;  // rising, but for those that were there before
   std::vector<std::uint16_t> hanging_point;
-  std::vector<std::array<std::uint16_t, 4>> masters;
+  std::vector<HangingMasters> masters;
 
   Patch before;  // the ranges as they were; of one made anew, without what was in them
 

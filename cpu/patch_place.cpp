@@ -101,23 +101,22 @@ void PatchPlacer::find_shared() {
 
 /// New own vertices, in the places that others left where there are such. Where a patch has no room
 /// for all, some take places among the shared ones, with one copy: every sweep passes them apart
-/// from now on, but to make room would be to move all vertices of the patch in all vectors.
+/// from now on, but to make room would be to move all vertices of the patch in all vectors. It does
+/// where the patch would have more shared vertices than own ones.
 void PatchPlacer::place_own(const Draft& draft) {
-  constexpr double kMostShared = 1;  // copies before, and new ones, to a vertex of its own
   std::vector<std::int32_t> fresh, kept;
   for (const std::int32_t v : draft.vertices)
     if (out_.packed[v] == claim(draft.patch)) fresh.push_back(v);
   if (fresh.empty() && !draft.anew) return;
-  const Patch& patch = out_.patches[draft.patch];
-  Range& own = out_.patches[draft.patch].own;
+  Patch& patch = out_.patches[draft.patch];
+  Range& own = patch.own;
   for (std::int32_t at = own.first; at < own.end(); ++at)
     if (out_.vertex[at] >= 0) kept.push_back(at);
   const std::size_t need = (kept.size() + fresh.size() + kGroup - 1) / kGroup;
   if (size_of(kGroup * need) > own.room) {
     const std::size_t fit = static_cast<std::size_t>(own.room) - kept.size();
     const std::size_t shared = static_cast<std::size_t>(patch.copies.size) + fresh.size() - fit;
-    if (draft.anew ||
-        static_cast<double>(shared) > kMostShared * static_cast<double>(kept.size())) {
+    if (draft.anew || shared > kept.size()) {
       move_own(draft.patch, need, kept);
     } else {
       for (std::size_t n = fit; n < fresh.size(); ++n) share(fresh[n]);

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstring>
 #include <new>
@@ -223,12 +222,8 @@ class PatchPoints {
     }
   }
 
-  // Of the four masters of a point on an edge, each counts twice.
-  static bool is_on_edge(const std::array<std::uint16_t, 4>& masters) {
-    return masters[0] == masters[1];
-  }
   void interpolate_hanging() {
-    const auto* const masters_of = level_.hanging_masters.data();  // writing may not change them
+    const auto* const masters_of = level_.hanging_masters.data();  // not read again for each write
     const std::uint16_t* const points = level_.hanging_point.data();
     for (std::int32_t h = patch_.hanging.first, end = patch_.hanging.end(); h < end; ++h) {
       const auto& masters = masters_of[h];

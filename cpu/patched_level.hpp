@@ -187,6 +187,10 @@ struct Transfer {
   std::size_t bytes() const;
 };
 
+/// The points that a hanging one is the mean of: four, or two on an edge, each twice, side by side.
+using HangingMasters = std::array<std::uint16_t, 4>;
+constexpr bool is_on_edge(const HangingMasters& masters) { return masters[0] == masters[1]; }
+
 struct PatchedLevel {
   const Level* level = nullptr;
   std::vector<Patch> patches;
@@ -211,7 +215,7 @@ struct PatchedLevel {
   std::vector<std::uint16_t> copy_point;
   std::vector<std::int32_t> copy_vertex;  // packed
   std::vector<std::uint16_t> hanging_point;
-  std::vector<std::array<std::uint16_t, 4>> hanging_masters;
+  std::vector<HangingMasters> hanging_masters;
   std::vector<std::int32_t> shared_tiles;  // filled one after the other
   std::int32_t shared = 0;                 // vertices: a place in these tiles, its number
   std::vector<std::int32_t> copies_begin, copies_of;  // per shared vertex, ascending

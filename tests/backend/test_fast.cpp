@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "core/simulation.hpp"
@@ -36,14 +35,7 @@ constexpr double kCodedSmoothed = 2e-2;
 constexpr double kSmoothed = 1e-4;
 
 /// A cut octree of three materials, with held components and hanging corners.
-Problem cut_octree() {
-  LinkedOctree body(test::box_body({21, 14, 11}), 1);
-  test::cut_plane(body, {9.3, 5.2, 4.1}, {1, 0.2, 0.3}, 5);
-  ProblemOptions options;
-  options.coarsest_vertices = 60;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
+Problem cut_octree() { return test::cut_block({21, 14, 11}, {9.3, 5.2, 4.1}, 5, 60); }
 
 /// Values of all levels for some rotations of level 0, four numbers each.
 void turn_to(const Problem& p, Backend& backend, const std::vector<double>& rotations) {
@@ -462,12 +454,7 @@ TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
 // Here the errors of 16-bit entries make the coarsest matrix indefinite, though the body is held.
 TEST(MixedPrecision, SolvesWhereCodedMatricesWouldBeIndefinite) {
   constexpr double kTolerance = 1e-9;
-  LinkedOctree body(test::box_body({21, 14, 11}), 1);
-  test::cut_plane(body, {9.24, 5.88, 5.17}, {1, 0.2, 0.3}, 8);
-  ProblemOptions options;
-  options.coarsest_vertices = 200;
-  options.with_oracle = false;
-  const Problem p(std::move(body), options);
+  const Problem p = test::cut_block({21, 14, 11}, {9.24, 5.88, 5.17}, 8, 200);
   const SolveStats stats = solve(p, "mixed", kTolerance).stats;
   EXPECT_TRUE(stats.converged);
   EXPECT_LE(stats.residual, kTolerance);

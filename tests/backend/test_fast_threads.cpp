@@ -15,23 +15,12 @@ namespace {
 using oracle::Vector;
 using test::Loaded;
 using test::Problem;
-using test::ProblemOptions;
 using test::Solved;
 
 constexpr OperatorScale kDynamic{0.8, 400};
 
-/// More cells than are left to one thread.
-Problem large_cut_octree() {
-  LinkedOctree body(test::box_body({33, 22, 15}), 1);
-  test::cut_plane(body, {14.3, 9.2, 7.1}, {1, 0.2, 0.3}, 8);
-  ProblemOptions options;
-  options.coarsest_vertices = 300;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
-
 TEST(FastBackend, GivesTheSameBitsForAnyNumberOfThreads) {
-  const Problem p = large_cut_octree();
+  const Problem p = test::large_cut_block();
   const auto solve = [&](const std::string& machine, int threads) {
     SolverSetup setup;
     setup.cycle = CycleType::k;
@@ -50,8 +39,8 @@ TEST(FastBackend, GivesTheSameBitsForAnyNumberOfThreads) {
 
 // Sums of shared vertices are there only when all patches are done, on whatever thread.
 TEST(FastBackend, RestrictsWhatResidualsLeaveToTheSameBits) {
-  const Problem p = large_cut_octree();
-  ASSERT_GE(p.hierarchy.levels[0].cells(), 2048);
+  const Problem p = test::large_cut_block();
+  ASSERT_GE(p.hierarchy.levels[0].cells(), 2048) << "one thread does all";
   for (const char* machine : {"fast", "mixed"})
     for (const int threads : {1, 2, 3, 4}) {
       const Loaded loaded(p, test::make_backend(machine, threads), kDynamic, {}, p.deformation());

@@ -37,14 +37,7 @@ constexpr double kSingle = 1e-5;
 constexpr double kSmoothed = 2e-4;
 
 /// A cut octree of three materials, with held components and hanging corners.
-Problem cut_octree() {
-  LinkedOctree body(test::box_body({15, 10, 9}), 1);
-  test::cut_plane(body, {7.3, 5.2, 4.1}, {1, 0.2, 0.3}, 4);
-  ProblemOptions options;
-  options.coarsest_vertices = 60;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
+Problem cut_octree() { return test::cut_block({15, 10, 9}, {7.3, 5.2, 4.1}, 4, 60); }
 
 // ---- operation by operation --------------------------------------------------------------------
 

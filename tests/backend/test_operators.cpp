@@ -499,14 +499,7 @@ std::vector<std::uint64_t> bits_of_a_solve(const Problem& p, const std::string& 
 }
 
 /// Large enough that every kind of loop is worth threads, with a cut and larger leaves.
-Problem large_problem() {
-  LinkedOctree body(test::box_body({41, 26, 19}), 1);
-  test::cut_plane(body, {17.3, 9.2, 8.1}, {1, 0.2, 0.3}, 9);
-  ProblemOptions options;
-  options.coarsest_vertices = 300;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
+Problem large_problem() { return test::cut_block({41, 26, 19}, {17.3, 9.2, 8.1}, 9, 300); }
 
 TEST(SameBits, ForAnyNumberOfThreadsAndAnyTile) {
   const Problem p = large_problem();

@@ -17,7 +17,6 @@ namespace {
 
 using oracle::Vector;
 using test::Problem;
-using test::ProblemOptions;
 
 constexpr const char* kVariable = "KERF_INSTRUCTION_SET";
 
@@ -45,16 +44,6 @@ class Environment {
   std::string before_;
 };
 
-/// Enough for several patches and threads; cut, with hanging corners and held components.
-Problem cut_octree() {
-  LinkedOctree body(test::box_body({33, 22, 15}), 1);
-  test::cut_plane(body, {14.3, 9.2, 7.1}, {1, 0.2, 0.3}, 8);
-  ProblemOptions options;
-  options.coarsest_vertices = 300;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
-
 /// One solve by conjugate gradients with a K-cycle.
 Vector solve(const Problem& p, std::unique_ptr<Backend> backend, double tolerance) {
   SolverSetup setup;
@@ -65,7 +54,7 @@ Vector solve(const Problem& p, std::unique_ptr<Backend> backend, double toleranc
 }
 
 TEST(InstructionSets, EachSolvesAsTheReference) {
-  const Problem p = cut_octree();
+  const Problem p = test::large_cut_block();
   // The residual times the condition of the body.
   constexpr double kTolerance = 1e-9, kOfTheSolver = 1e-6;
   const Vector expected = solve(p, make_cpu_backend({1, 0}), kTolerance);
@@ -83,7 +72,7 @@ TEST(InstructionSets, EachSolvesAsTheReference) {
 // Packs of baseline and AVX2 have one width, those of AVX-512 another (cpu/pack.hpp), and fma is
 // written out.
 TEST(InstructionSets, GiveTheSameBitsAsEachOtherForAnyNumberOfThreads) {
-  const Problem p = cut_octree();
+  const Problem p = test::large_cut_block();
   constexpr double kTolerance = 1e-3;  // bits show it after a few cycles
   const std::vector<std::string> sets = fast_instruction_sets();
   for (const bool single : {false, true})

@@ -95,24 +95,21 @@ TYPED_TEST(PointsOfPacks, ThatSeveralLanesMeetGetTheSumOfAll) {
     }
 }
 
-/// Rows of kRun cells that begin at several points.
-template <int kRun, class S>
-void expect_runs(const std::vector<std::uint16_t>& begins) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  std::array<std::uint16_t, kLanes> at;
-  std::array<std::uint16_t, kLanes / 4> heads;
-  for (int k = 0; k < kLanes; ++k) at[k] = static_cast<std::uint16_t>(begins[k / kRun] + k % kRun);
-  for (int k = 0; k < kLanes; k += 4) heads[k / 4] = at[k];
+/// Cells whose left ends along x are at some points and whose right ends are at those behind these:
+/// gather(x, left, right) and add(y, f, g) are to read and to add to them.
+template <class S, class Gather, class Add>
+void expect_ends(const std::array<std::uint16_t, Pack<S>::kLanes>& at, const Gather& gather,
+                 const Add& add) {
   const Records<S> x(3), before(1);
   Records<S> y(1);
   Vec3<Pack<S>> left, right;
   const Vec3<Pack<S>> f = numbers<S>(1), g = numbers<S>(5);
 
-  cpu::gather_runs<kRun>(x.s, heads.data(), left, right);
-  cpu::add_runs<kRun>(y.s, heads.data(), f, g);
+  gather(x.s, left, right);
+  add(y.s, f, g);
 
   std::array<std::array<S, 3>, 64> sum{};
-  for (int k = 0; k < kLanes; ++k)
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
     for (int c = 0; c < 3; ++c) {
       EXPECT_EQ(left[c][k], x.at(at[k], c));
       EXPECT_EQ(right[c][k], x.at(at[k] + 1, c));
@@ -124,6 +121,19 @@ void expect_runs(const std::vector<std::uint16_t>& begins) {
       EXPECT_EQ(y.at(p, c), before.at(p, c) + sum[p][c]) << "point " << p;
     EXPECT_EQ(y.at(p, 3), S(0)) << "point " << p;
   }
+}
+
+/// Rows of kRun cells that begin at several points.
+template <int kRun, class S>
+void expect_runs(const std::vector<std::uint16_t>& begins) {
+  constexpr int kLanes = Pack<S>::kLanes;
+  std::array<std::uint16_t, kLanes> at;
+  std::array<std::uint16_t, kLanes / 4> heads;
+  for (int k = 0; k < kLanes; ++k) at[k] = static_cast<std::uint16_t>(begins[k / kRun] + k % kRun);
+  for (int k = 0; k < kLanes; k += 4) heads[k / 4] = at[k];
+  expect_ends<S>(
+      at, [&](const S* x, auto& l, auto& r) { cpu::gather_runs<kRun>(x, heads.data(), l, r); },
+      [&](S* y, const auto& l, const auto& r) { cpu::add_runs<kRun>(y, heads.data(), l, r); });
 }
 
 TYPED_TEST(PointsOfPacks, OfRowsAreReadAndAddedToTogether) {
@@ -146,27 +156,9 @@ TYPED_TEST(PointsOfPacks, AreReadAndAddedToAsPairs) {
   for (int k = 0; k < kLanes; ++k) at[k] = static_cast<std::uint16_t>(2 + (23 * k + 5) % 17);
   at[1] = cpu::kNothing;
   at[kLanes - 1] = static_cast<std::uint16_t>(at[0] + 1);
-  const Records<S> x(3), before(1);
-  Records<S> y(1);
-  Vec3<Pack<S>> left, right;
-  const Vec3<Pack<S>> f = numbers<S>(1), g = numbers<S>(5);
-
-  cpu::gather_pairs(x.s, at.data(), left, right);
-  cpu::add_pairs(y.s, at.data(), f, g);
-
-  std::array<std::array<S, 3>, 64> sum{};
-  for (int k = 0; k < kLanes; ++k)
-    for (int c = 0; c < 3; ++c) {
-      EXPECT_EQ(left[c][k], x.at(at[k], c));
-      EXPECT_EQ(right[c][k], x.at(at[k] + 1, c));
-      sum[at[k]][c] += f[c][k];
-      sum[at[k] + 1][c] += g[c][k];
-    }
-  for (int p = 0; p < 64; ++p) {
-    for (int c = 0; c < 3; ++c)  // small integers: exact in any order
-      EXPECT_EQ(y.at(p, c), before.at(p, c) + sum[p][c]) << "point " << p;
-    EXPECT_EQ(y.at(p, 3), S(0)) << "point " << p;
-  }
+  expect_ends<S>(
+      at, [&](const S* x, auto& l, auto& r) { cpu::gather_pairs(x, at.data(), l, r); },
+      [&](S* y, const auto& l, const auto& r) { cpu::add_pairs(y, at.data(), l, r); });
 }
 
 /// Cells with other rotations, by their numbers: [group][component][kGroup].

@@ -187,6 +187,20 @@ struct Problem {
   }
 };
 
+/// A block with larger cells inside, cut half through at a point by a slanted blade of some half
+/// width, with held components and hanging corners. Without the oracle.
+inline Problem cut_block(const Vec3i& size, const Vec3d& point, double half_width,
+                         int coarsest_vertices) {
+  LinkedOctree body(box_body(size), 1);
+  cut_plane(body, point, {1, 0.2, 0.3}, half_width);
+  ProblemOptions options;
+  options.coarsest_vertices = coarsest_vertices;
+  options.with_oracle = false;
+  return {std::move(body), options};
+}
+/// One large enough for several patches and threads.
+inline Problem large_cut_block() { return cut_block({33, 22, 15}, {14.3, 9.2, 7.1}, 8, 300); }
+
 /// A backend that holds a problem's values, ready to cycle, and the oracle's matrices of it.
 struct Loaded {
   const Problem& problem;
