@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "cpu/fast_kernels.hpp"
@@ -21,7 +22,7 @@ struct FinestCells {
   const PatchedLevel& level;
   const FinestRotations<S>& rotations;
 
-  const CellKind& kind(std::size_t lane) const { return level.kinds[level.kind[lane / kGroup]]; }
+  const CellKind& kind(std::uint16_t number) const { return level.kinds[number]; }
   /// w; the others follow in steps of a group.
   const S* rotation(std::size_t lane) const { return rotations.of(lane); }
   template <class T>
@@ -45,9 +46,7 @@ struct TurnedCells {
   const PatchedLevel &finest, &level;
   const StoredMatrices<S>& matrices;
 
-  CellKind kind(std::size_t lane) const {
-    return element_kind(finest.kinds, level.kind[lane / kGroup]);
-  }
+  CellKind kind(std::uint16_t number) const { return element_kind(finest.kinds, number); }
   const S* rotation(std::size_t lane) const { return matrices.rotation_of(lane); }
   template <class T>
   T component(std::size_t lane, std::size_t c) const {
@@ -66,8 +65,8 @@ struct TurnedCells {
 
 constexpr int kAnyMaterial = -1;
 
-/// Rotations of some lanes (-1: the identity). Those of one group lie behind those of the one
-/// before.
+/// Rotations of some lanes (-1: any; needs a lane 0 with one). Those of one group lie behind those
+/// of the one before.
 template <class Cells, class S>
 void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat<Pack<S>>& out) {
   constexpr int kLanes = Pack<S>::kLanes;
@@ -84,43 +83,86 @@ void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat
     }
   }
 #endif
+  // No lane is asked whether it is there: that cannot be foreseen.
   alignas(kPackBytes) S q[4][kLanes];
   for (int k = 0; k < kLanes; ++k) {
-    q[0][k] = 1;
-    q[1][k] = q[2][k] = q[3][k] = 0;
-    if (lanes[k] < 0) continue;
-    for (std::size_t c = 0; c < 4; ++c)
-      q[c][k] = cells.template component<S>(static_cast<std::size_t>(lanes[k]), c);
+    const auto lane = static_cast<std::size_t>(std::max(lanes[k], 0));
+    if constexpr (std::is_same_v<decltype(cells.rotation(lane)), const S*>) {
+      const S* const from = cells.rotation(lane);
+      for (int c = 0; c < 4; ++c) q[c][k] = from[kGroup * c];
+    } else {
+      for (std::size_t c = 0; c < 4; ++c) q[c][k] = cells.template component<S>(lane, c);
+    }
   }
   out = {load_pack(q[0]), load_pack(q[1]), load_pack(q[2]), load_pack(q[3])};
+}
+
+/// The kind of the cells in some lanes (-1: none), if it is one. False where there are several, and
+/// -1 where there are no cells.
+template <int kLanes, class Cells>
+bool are_of_one_kind(const Cells& cells, const std::int32_t* lanes, int& kind) {
+  int of[kLanes];
+  kind = -1;
+  for (int k = 0; k < kLanes; ++k) {
+    of[k] = cells.level.kind[static_cast<std::size_t>(std::max(lanes[k], 0)) / kGroup];
+    kind = lanes[k] < 0 ? kind : of[k];
+  }
+  bool others = false;
+  for (int k = 0; k < kLanes; ++k) others |= (lanes[k] >= 0) & (of[k] != kind);
+  return !others;
 }
 
 /// Elements of some lanes (-1: none); those that are not of `material` have no stiffness.
 template <class Cells, class S>
 void load_elements(const Cells& cells, const OperatorScale& scale, const std::int32_t* lanes,
                    int material, kernels::FinestChild<Pack<S>>& out) {
-  constexpr int kLanes = Pack<S>::kLanes;
-  alignas(kPackBytes) S stiffness[kLanes] = {}, mass[kLanes] = {};
-  for (int k = 0; k < kLanes; ++k) {
+  using P = Pack<S>;
+  load_rotations(cells, lanes, out.rotation);
+  const auto is_of_it = [&](const CellKind& kind) {
+    return material == kAnyMaterial || kind.material == material;
+  };
+  int number = -1;
+  alignas(kPackBytes) S stiffness[P::kLanes] = {}, mass[P::kLanes] = {};
+  if (are_of_one_kind<P::kLanes>(cells, lanes, number)) {
+    const CellKind kind = number < 0 ? CellKind{} : cells.kind(static_cast<std::uint16_t>(number));
+    const double count = is_of_it(kind) ? 1 : 0;
+    for (int k = 0; k < P::kLanes; ++k) stiffness[k] = lanes[k] < 0 ? S(0) : S(1);
+    const P present = load_pack(stiffness);
+    out.stiffness = P(static_cast<S>(count * scale.stiffness * kind.stiffness)) * present;
+    out.mass = P(static_cast<S>(count * scale.mass * kind.mass)) * present;
+    return;
+  }
+  for (int k = 0; k < P::kLanes; ++k) {
     if (lanes[k] < 0) continue;
-    const CellKind& kind = cells.kind(static_cast<std::size_t>(lanes[k]));
-    if (material != kAnyMaterial && kind.material != material) continue;
+    const CellKind& kind = cells.kind(cells.level.kind[lanes[k] / kGroup]);
+    if (!is_of_it(kind)) continue;
     stiffness[k] = static_cast<S>(scale.stiffness * kind.stiffness);
     mass[k] = static_cast<S>(scale.mass * kind.mass);
   }
-  load_rotations(cells, lanes, out.rotation);
   out.stiffness = load_pack(stiffness);
   out.mass = load_pack(mass);
 }
 
-/// Which materials the cells in some lanes are of, as bits. `lanes`: [octant][kGroup].
+/// Which of `count` materials the cells in some lanes are of, as bits. `lanes`: [octant][kGroup].
 template <class S, class Cells>
-std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int octants) {
+std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int octants,
+                           std::size_t count) {
   std::uint64_t out = 0;
-  for (int octant = 0; octant < octants; ++octant)
-    for (int k = 0; k < Pack<S>::kLanes; ++k)
-      if (const std::int32_t lane = lanes[kGroup * octant + k]; lane >= 0)
-        out |= std::uint64_t{1} << (cells.kind(static_cast<std::size_t>(lane)).material % 64);
+  for (int octant = 0; octant < octants; ++octant) {
+    const std::int32_t* const of = lanes + kGroup * octant;
+    const auto add = [&](std::size_t kind) {
+      const int material = cells.kind(static_cast<std::uint16_t>(kind)).material;
+      out |= std::uint64_t{1} << (material % 64);
+    };
+    int kind = -1;
+    if (are_of_one_kind<Pack<S>::kLanes>(cells, of, kind)) {
+      if (kind >= 0) add(static_cast<std::size_t>(kind));
+    } else {
+      for (int k = 0; k < Pack<S>::kLanes; ++k)
+        if (of[k] >= 0) add(cells.level.kind[of[k] / kGroup]);
+    }
+    if (count == 1 && out != 0) break;
+  }
   return out;
 }
 

@@ -11,6 +11,7 @@
 #include "cpu/fast_kernels.hpp"
 #include "cpu/general_children.hpp"
 #include "kernels/coarsen.hpp"
+#include "kernels/corner_coarsen.hpp"
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/transfer.hpp"
 
@@ -48,129 +49,116 @@ struct FinestLanes {
   }
 };
 
-/// Columns of the W of each lane, with their non-zeros in any lane; null is a lane without a cell.
+/// The W of the cells in some lanes, entry by entry; zero in others.
 template <class P>
-kernels::WeightColumns<P> columns_of(const Weights* const (&w)[P::kLanes]) {
-  using S = typename P::Scalar;
-  kernels::WeightColumns<P> out{};
-  for (int m = 0; m < 8; ++m)
-    for (int i = 0; i < 8; ++i) {
-      S weight[P::kLanes];
-      bool any = false;
-      for (int k = 0; k < P::kLanes; ++k) {
-        weight[k] = w[k] == nullptr ? S(0) : static_cast<S>(w[k]->w[i][m]);
-        any = any || weight[k] != 0;
-      }
-      if (!any) continue;
-      const int at = out.count[m]++;
-      out.child[m][at] = i;
-      out.weight[m][at] = load_pack(weight);
-    }
-  return out;
-}
+struct WeightLanes {
+  alignas(kPackBytes) typename P::Scalar at[64][P::kLanes] = {};
 
-/// Columns of the fold of each lane: its corners from its slots.
-template <class P>
-kernels::WeightColumns<P> fold_columns(const PatchedLevel& level, const std::int32_t* cells) {
-  Weights fold[P::kLanes];
-  const Weights* w[P::kLanes];
-  for (int k = 0; k < P::kLanes; ++k) {
-    w[k] = nullptr;
-    if (cells[k] < 0) continue;
-    kernels::fold_weights(level.level->fold[cells[k]], fold[k].w);
-    w[k] = &fold[k];
+  void put(int lane, const Weights& w) {
+    for (int e = 0; e < 64; ++e) at[e][lane] = static_cast<typename P::Scalar>(w.w[e / 8][e % 8]);
   }
-  return columns_of<P>(w);
-}
+  void copy(int to, int from) {
+    for (auto& entry : at) entry[to] = entry[from];
+  }
+  /// Their columns, with what is not zero in some lane.
+  void columns(kernels::WeightColumns<P>& out) const {
+    for (int m = 0; m < 8; ++m) {
+      out.count[m] = 0;
+      for (int i = 0; i < 8; ++i) {
+        const P weight = load_pack(at[8 * i + m]);
+        if (all(weight <= P(0)) && all(P(0) <= weight)) continue;
+        const int n = out.count[m]++;
+        out.child[m][n] = i;
+        out.weight[m][n] = weight;
+      }
+    }
+  }
+};
 
-/// sum += W^T A W, A given in full.
+/// sum += W^T A W, A given in full; W for each component. As kernels/coarsen.hpp, with sums that
+/// stay in registers.
 template <class P>
-void add_product(const P (&full)[24][24], const kernels::WeightColumns<P>& columns,
+void add_product(const P (&full)[24][24], const kernels::WeightColumns<P>* const (&w)[3],
                  P (&sum)[kEntries]) {
   P strip[3][24];
   for (int n = 0; n < 8; ++n) {
-    if (columns.count[n] == 0) continue;
-    kernels::gather_strip(full, columns, n, strip);
-    for (int m = n; m < 8; ++m) {
-      if (columns.count[m] == 0) continue;
-      const kernels::Mat3<P> block = kernels::gather_block(strip, columns, m);
+    for (int b = 0; b < 3; ++b)
+      for (int col = 0; col < 24; ++col) {
+        P at(0);
+        for (int k = 0; k < w[b]->count[n]; ++k)
+          at = fma(w[b]->weight[n][k], full[3 * w[b]->child[n][k] + b][col], at);
+        strip[b][col] = at;
+      }
+    for (int m = n; m < 8; ++m)
       for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < (m == n ? a + 1 : 3); ++b)
-          sum[kernels::packed_index(3 * m + a, 3 * n + b)] += block[a][b];
-    }
+        for (int b = 0; b < (m == n ? a + 1 : 3); ++b) {
+          P& to = sum[kernels::packed_index(3 * m + a, 3 * n + b)];
+          P at = to;
+          for (int k = 0; k < w[a]->count[m]; ++k)
+            at = fma(w[a]->weight[m][k], strip[b][3 * w[a]->child[m][k] + a], at);
+          to = at;
+        }
   }
 }
 
-/// Matrices of some cells of level 0 over their corners, in full.
-template <class S>
-void corner_matrices(const PackedMaterial<S>& m, const kernels::FinestChild<Pack<S>>& element,
-                     Pack<S> (&full)[24][24]) {
-  const auto R = kernels::to_matrix(element.rotation);
-  for (int i = 0; i < 8; ++i)
-    for (int j = 0; j <= i; ++j) {
-      const auto block =
-          kernels::rotate_block(m.stiffness, m.mass, R, element.stiffness, element.mass, i, j);
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b)
-          full[3 * i + a][3 * j + b] = full[3 * j + b][3 * i + a] =
-              i == j && b > a ? block[b][a] : block[a][b];
-    }
-}
-
-/// The same where lanes may be of several materials.
+/// Matrices of some cells of level 0 over their corners. Lanes may be of several materials.
 template <class S>
 void corner_matrices(const PatchedLevel& level, const std::vector<PackedMaterial<S>>& materials,
-                     const FinestLanes<S>& lanes, Pack<S> (&full)[24][24]) {
-  if (lanes.material != FinestLanes<S>::kMixed) {
-    const auto material = static_cast<std::size_t>(std::max(lanes.material, 0));
-    return corner_matrices(materials[material], lanes.element, full);
-  }
+                     const FinestLanes<S>& lanes, Pack<S> (&out)[kEntries]) {
+  using P = Pack<S>;
+  const auto R = kernels::to_matrix(lanes.element.rotation);
+  const auto of = [&](const PackedMaterial<S>& m, P* to) {
+    kernels::cell_matrix(m.stiffness, m.mass, R, lanes.element.stiffness, lanes.element.mass, to);
+  };
+  if (lanes.material != FinestLanes<S>::kMixed)
+    return of(materials[static_cast<std::size_t>(std::max(lanes.material, 0))], out);
   for (std::size_t m = 0; m < materials.size(); ++m) {
-    Pack<S> some[24][24];
-    corner_matrices(materials[m], lanes.element, some);
-    for (int k = 0; k < Pack<S>::kLanes; ++k) {
+    P some[kEntries];
+    of(materials[m], some);
+    for (int k = 0; k < P::kLanes; ++k) {
       const bool none = lanes.cell[k] < 0;
       if (!none && level.kinds[level.kind[level.lane[lanes.cell[k]] / kGroup]].material != m)
         continue;
-      for (int i = 0; i < 24; ++i)
-        for (int j = 0; j < 24; ++j) full[i][j].set(k, some[i][j][k]);
+      for (int e = 0; e < kEntries; ++e) out[e].set(k, some[e][k]);
     }
   }
 }
 
 /// Brings matrices of some cells from corners to slots.
 template <class P>
-void fold_matrices(const PatchedLevel& level, const std::int32_t* cells, P (&full)[24][24]) {
-  P sum[kEntries];
-  std::fill(sum, sum + kEntries, P(0));
-  add_product(full, fold_columns<P>(level, cells), sum);
-  kernels::expand_packed(static_cast<const P*>(sum), full);
+void fold_matrices(const PatchedLevel& level, const std::int32_t* cells, P (&entries)[kEntries]) {
+  WeightLanes<P> lanes;
+  for (int k = 0; k < P::kLanes; ++k) {
+    if (cells[k] < 0) continue;
+    Weights w;
+    kernels::fold_weights(level.level->fold[cells[k]], w.w);
+    lanes.put(k, w);
+  }
+  kernels::WeightColumns<P> columns;
+  lanes.columns(columns);
+  P full[24][24];
+  kernels::expand_packed(static_cast<const P*>(entries), full);
+  std::fill(entries, entries + kEntries, P(0));
+  add_product(full, {&columns, &columns, &columns}, entries);
 }
 
-/// Zero in the rows and columns of held components. Needs  matrices over slots.
+/// Zero in the rows and columns of held components. Needs  matrices over slots, or of cells whose
+/// corners are their slots.
 template <class S>
 void mask_matrices(const PatchedLevel& level, const FinestLanes<S>& lanes,
-                   Pack<S> (&full)[24][24]) {
-  Pack<S> keep[24];
-  for (int i = 0; i < 24; ++i) {
-    S of[Pack<S>::kLanes];
-    for (int k = 0; k < Pack<S>::kLanes; ++k) {
-      of[k] = 1;
-      if (lanes.cell[k] < 0) continue;
-      const std::int32_t v = level.level->slots[lanes.cell[k]][static_cast<std::size_t>(i / 3)];
-      if ((level.level->fixed[v] >> (i % 3) & 1) != 0) of[k] = 0;
-    }
-    keep[i] = load_pack(of);
+                   Pack<S> (&entries)[kEntries]) {
+  using P = Pack<S>;
+  alignas(kPackBytes) S keep[24][P::kLanes];
+  for (auto& row : keep) std::fill(std::begin(row), std::end(row), S(1));
+  for (int k = 0; k < P::kLanes; ++k) {
+    if (lanes.cell[k] < 0 || level.held[lanes.cell[k]] == kFree) continue;
+    const auto& slots = level.level->slots[lanes.cell[k]];
+    for (std::size_t i = 0; i < 24; ++i)
+      if ((level.level->fixed[slots[i / 3]] >> (i % 3) & 1) != 0) keep[i][k] = 0;
   }
   for (int i = 0; i < 24; ++i)
-    for (int j = 0; j < 24; ++j) full[i][j] *= keep[i] * keep[j];
-}
-
-/// Matrices over corners from entries by modes, in full.
-template <class P>
-void full_from_modes(P (&entries)[kEntries], P (&full)[24][24]) {
-  kernels::corners_from_modes<P>(entries, entries);
-  kernels::expand_packed(static_cast<const P*>(entries), full);
+    for (int j = 0; j <= i; ++j)
+      entries[kernels::packed_index(i, j)] *= load_pack(keep[i]) * load_pack(keep[j]);
 }
 
 /// w[i][m]: the value at slot i of a cell from those at its corners m, the inverse of its fold:
@@ -189,17 +177,74 @@ inline void unfold_weights(kernels::FoldCode code, float (&w)[8][8]) {
     }
 }
 
-/// Points of a child from the corners of its parent: its corners, or its slots.
-inline Weights child_weights(const Level& level, std::int32_t child, bool slots) {
-  Weights out;
-  const int place = level.place[child];
-  if (place == kernels::kPassed && slots)
+/// Slots of a child from the corners of its parent.
+inline void slot_weights(const Level& level, std::int32_t child, Weights& out) {
+  if (level.place[child] == kernels::kPassed)
     unfold_weights(level.fold[child], out.w);
   else
-    kernels::transfer_weights(slots ? level.fold[child] : kernels::FoldCode{0}, place,
-                              kernels::FoldCode{0}, out.w);
-  return out;
+    kernels::transfer_weights(level.fold[child], level.place[child], kernels::FoldCode{0}, out.w);
 }
+
+/// Corners of some children (-1: none) from the corners of their parents, for each component: by
+/// way of slots, of which some are held.
+template <class P>
+class SlotColumns {
+ public:
+  SlotColumns(const SlotColumns&) = delete;
+  SlotColumns& operator=(const SlotColumns&) = delete;
+  SlotColumns(const Level& level, const std::int32_t* cells) {
+    std::uint32_t held[P::kLanes];
+    bool alike = true;  // the components
+    for (int k = 0; k < P::kLanes; ++k) {
+      if (cells[k] < 0) continue;
+      held[k] = 0;
+      for (std::size_t j = 0; j < 8; ++j) {
+        const std::uint8_t fixed = level.fixed[level.slots[cells[k]][j]];
+        held[k] |= std::uint32_t{fixed} << 3 * j;
+        alike = alike && (fixed == 0 || fixed == 7);
+      }
+    }
+    for (int c = 0; c < (alike ? 1 : 3); ++c) {
+      WeightLanes<P> lanes;
+      for (int k = 0; k < P::kLanes; ++k) {
+        if (cells[k] < 0) continue;
+        int same = 0;  // most lanes are like one before
+        while (same < k && !(cells[same] >= 0 && held[same] == held[k] &&
+                             level.fold[cells[same]] == level.fold[cells[k]] &&
+                             level.place[cells[same]] == level.place[cells[k]]))
+          ++same;
+        if (same < k)
+          lanes.copy(k, same);
+        else
+          put(level, cells[k], c, k, lanes);
+      }
+      lanes.columns(of_[c]);
+      by_[c] = &of_[c];
+    }
+    if (alike) by_[1] = by_[2] = by_[0];
+  }
+
+  void add_product(const P (&full)[24][24], P (&sum)[kEntries]) const {
+    cpu::add_product(full, by_, sum);
+  }
+
+ private:
+  static void put(const Level& level, std::int32_t cell, int component, int lane,
+                  WeightLanes<P>& lanes) {
+    Weights fold, slots, out{};
+    kernels::fold_weights(level.fold[cell], fold.w);
+    slot_weights(level, cell, slots);
+    for (std::size_t j = 0; j < 8; ++j) {
+      if ((level.fixed[level.slots[cell][j]] >> component & 1) != 0) continue;
+      for (int i = 0; i < 8; ++i)
+        for (int m = 0; m < 8; ++m) out.w[i][m] += fold.w[i][j] * slots.w[j][m];
+    }
+    lanes.put(lane, out);
+  }
+
+  kernels::WeightColumns<P> of_[3];
+  const kernels::WeightColumns<P>* by_[3];
+};
 
 /// Matrices by modes of parents whose children are one element each, none of them partly held.
 template <class Cells, class S>
@@ -207,7 +252,7 @@ void merge_elements(const Cells& cells, const std::vector<PackedMaterial<S>>& ma
                     const OperatorScale& scale, const std::int32_t* children,
                     Pack<S> (&out)[kEntries]) {
   using P = Pack<S>;
-  const std::uint64_t present = materials_of<S>(cells, children, 8);
+  const std::uint64_t present = materials_of<S>(cells, children, 8, materials.size());
   if (present == 0)  // all children are wholly held
     for (P& entry : out) entry = P(0);
   bool first = true;
@@ -230,6 +275,17 @@ void merge_elements(const Cells& cells, const std::vector<PackedMaterial<S>>& ma
   }
 }
 
+/// Entries to which is added what is assigned, once to each.
+template <class P>
+struct AddedEntries {
+  struct Entry {
+    P& of;
+    void operator=(const P& value) const { of += value; }
+  };
+  P* to;
+  Entry operator[](int entry) const { return {to[entry]}; }
+};
+
 /// Adds the matrices of cells in some lanes (-1: none) of level 1 of which only rotations are
 /// stored.
 template <class S>
@@ -242,15 +298,13 @@ void add_turned(const TurnedCells<S>& cells, const std::vector<PackedMaterial<S>
         lanes[k] >= 0 && cells.matrices.is_turned(static_cast<std::size_t>(lanes[k] / kGroup))
             ? lanes[k]
             : -1;
-  const std::uint64_t present = materials_of<S>(cells, turned, 1);
+  const std::uint64_t present = materials_of<S>(cells, turned, 1, materials.size());
   for (std::size_t m = 0; m < materials.size() && present != 0; ++m) {
     if (((present >> (m % 64)) & 1) == 0) continue;
     kernels::FinestChild<Pack<S>> child;
     load_elements(cells, scale, turned, static_cast<int>(m), child);
-    Pack<S> some[kEntries];
     kernels::finest_mode_matrix(kernels::to_matrix(child.rotation), child.stiffness, child.mass,
-                                materials[m].modes, static_cast<Pack<S>*>(some));
-    for (int e = 0; e < kEntries; ++e) sum[e] += some[e];
+                                materials[m].modes, AddedEntries<Pack<S>>{sum});
   }
 }
 

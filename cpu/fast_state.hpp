@@ -279,7 +279,7 @@ class FastBackend final : public Backend {
   template <std::size_t kSums, class Body>
   std::array<double, kSums> sum_scalars(std::int32_t size, const Body& body) const;
   void read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
-                     Pack<double> (&full)[24][24]) const;
+                     Pack<double> (&out)[kEntries]) const;
   void assemble_coarsest(bool definite);
   /// What the cells of a group are that are one element each.
   CellKind element_kind(int level, std::size_t group) const {
@@ -293,9 +293,11 @@ class FastBackend final : public Backend {
   void turn();
   void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
-  void add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
-                            Pack<S> (&sum)[kEntries]) const;
-  void merge_general(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
+  void corner_children(const std::int32_t (&child)[Pack<S>::kLanes],
+                       Pack<S> (&out)[kEntries]) const;
+  void add_by_slots(const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
+  void merge_general_finest(std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
+  void merge_general_stored(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
   template <class Value>
   void chebyshev_step(int level, const Value& value, double step, bool put);
   void chebyshev(int level);

@@ -4,6 +4,7 @@
 // factor of the coarsest level.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/solve/definite.hpp"
@@ -22,60 +23,101 @@ void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack
   if (level == 1) add_turned(turned_cells(), materials<S>(), scale_, lanes, out);
 }
 
-// Some children of the coarse cells in the lanes, one each. Held components are those of slots, so
-// where there are some the way from corners has two steps.
+// Cells of level 0 in some lanes over their corners, zero where those are held.
 template <class S>
-void FastBackend<S>::add_general_children(int fine, const std::int32_t (&child)[Pack<S>::kLanes],
-                                          Pack<S> (&sum)[kEntries]) const {
+void FastBackend<S>::corner_children(const std::int32_t (&child)[Pack<S>::kLanes],
+                                     Pack<S> (&out)[kEntries]) const {
+  const PatchedLevel& packed = levels_[0].patched;
+  const FinestLanes<S> lanes(packed, rotations_, scale_, child);
+  corner_matrices(packed, materials<S>(), lanes, out);
+  if (lanes.any_held) mask_matrices(packed, lanes, out);
+}
+
+// Some children of the coarse cells in the lanes, one each, of level 0.
+template <class S>
+void FastBackend<S>::add_by_slots(const std::int32_t (&child)[Pack<S>::kLanes],
+                                  Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
-  const PatchedLevel& packed = levels_[fine].patched;
-  P full[24][24];
-  bool over_slots = false;
-  if (fine == 0) {
-    const FinestLanes<S> lanes(packed, rotations_, scale_, child);
-    corner_matrices(packed, materials<S>(), lanes, full);
-    over_slots = lanes.any_held;
-    if (lanes.any_held && lanes.any_folded) fold_matrices<P>(packed, child, full);
-    if (lanes.any_held) mask_matrices(packed, lanes, full);
-  } else {
-    std::int32_t lanes[P::kLanes];
-    for (int k = 0; k < P::kLanes; ++k) lanes[k] = child[k] < 0 ? -1 : packed.lane[child[k]];
-    P entries[kEntries];
-    gather_matrices(fine, lanes, entries);
-    full_from_modes(entries, full);
+  const PatchedLevel& packed = levels_[0].patched;
+  P entries[kEntries], full[24][24];
+  corner_matrices(packed, materials<S>(), FinestLanes<S>(packed, rotations_, scale_, child),
+                  entries);
+  kernels::expand_packed(static_cast<const P*>(entries), full);
+  SlotColumns<P>(*packed.level, child).add_product(full, sum);
+}
+
+/// body(child, present) for the first of the others of each octant in each lane, the second ones,
+/// and so on; child: [octant][lane], present: bits of the octants in which some lane has one.
+template <class P, class Body>
+void for_rounds(const GeneralChildren& children, const Body& body) {
+  std::int32_t child[8][P::kLanes];
+  for (int n = 0;; ++n) {
+    unsigned present = 0;
+    for (int octant = 0; octant < 8; ++octant)
+      if (children.others(octant, n, ChildWay::octant, child[octant])) present |= 1U << octant;
+    if (present == 0) return;
+    body(child, present);
   }
-  Weights weights[P::kLanes];
-  const Weights* w[P::kLanes];
-  for (int k = 0; k < P::kLanes; ++k) {
-    w[k] = nullptr;
-    if (child[k] < 0) continue;  // its matrix is zero
-    weights[k] = child_weights(*packed.level, child[k], over_slots);
-    w[k] = &weights[k];
-  }
-  add_product(full, columns_of<P>(w), sum);
 }
 
 template <class S>
-void FastBackend<S>::merge_general(int fine, std::size_t group, int first,
-                                   Pack<S> (&out)[kEntries]) const {
+void FastBackend<S>::merge_general_finest(std::size_t group, int first,
+                                          Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
-  const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
-  GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
+  const PatchedLevel &from = levels_[0].patched, &to = levels_[1].patched;
+  const GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
+  P some[kEntries];
   bool any_other = false;
-  for (P& entry : out) entry = P(0);
-  for (int octant = 0; octant < 8; ++octant) {
-    std::int32_t child[P::kLanes];
-    for (int n = 0; children.others(octant, n, child); ++n) {
-      add_general_children(fine, child, out);
+  const auto add_some = [&] {
+    for (int e = 0; e < kEntries; ++e) out[e] += some[e];
+    any_other = true;
+  };
+  std::fill(std::begin(out), std::end(out), P(0));
+  for_rounds<P>(children, [&](const auto& child, unsigned present) {
+    kernels::coarsen_corners<P>(
+        [&](int octant, P(&entries)[kEntries]) { corner_children(child[octant], entries); },
+        present, static_cast<P*>(some));
+    add_some();
+  });
+  std::int32_t child[P::kLanes];
+  for (int n = 0; children.others(0, n, ChildWay::whole, child); ++n) {
+    corner_children(child, some);
+    add_some();
+  }
+  for (int octant = 0; octant < 8; ++octant)
+    for (int n = 0; children.others(octant, n, ChildWay::slots, child); ++n) {
+      add_by_slots(child, out);
       any_other = true;
     }
-  }
   if (any_other) kernels::modes_from_corners<P>(out, out);
   if (!children.any_plain()) return;
-  P some[kEntries];
   std::fill(std::begin(some), std::end(some), P(0));
   merge_elements(FinestCells<S>{from, rotations_}, materials<S>(), scale_, children.plain(), some);
   for (int e = 0; e < kEntries; ++e) out[e] += some[e];
+}
+
+// Behind the end of a cut two duplicates of one place can have one parent. A child that is passed
+// on is the only one, so these have none.
+template <class S>
+void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first,
+                                          Pack<S> (&out)[kEntries]) const {
+  using P = Pack<S>;
+  const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
+  ensures(to.kind[group] == kGeneral, "a child that is passed on is taken for one of several");
+  const GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
+  std::fill(std::begin(out), std::end(out), P(0));
+  for_rounds<P>(children, [&](const auto& child, unsigned) {
+    std::int32_t lanes[8 * kGroup];
+    for (int octant = 0; octant < 8; ++octant)
+      for (int k = 0; k < P::kLanes; ++k) {
+        const std::int32_t cell = child[octant][k];
+        lanes[kGroup * octant + k] = cell < 0 ? -1 : from.lane[cell];
+      }
+    P some[kEntries];
+    merge_stored<S>([&](const auto& of, auto& entries) { gather_matrices(fine, of, entries); },
+                    lanes, false, true, some);
+    for (int e = 0; e < kEntries; ++e) out[e] += some[e];
+  });
 }
 
 // Rotations of the cells of level 1 that are one element each, or may be. Eight cells of one
@@ -140,7 +182,8 @@ void FastBackend<S>::coarsen(int fine) {
         return to.matrices.store(group, first, out);
       }
       if (kind == kGeneral || kind == kGeneralPassed)
-        merge_general(fine, group, first, out);
+        fine == 0 ? merge_general_finest(group, first, out)
+                  : merge_general_stored(fine, group, first, out);
       else if (fine == 0)
         merge_elements(FinestCells<S>{from.patched, rotations_}, all, scale_, children, out);
       else if (fine == 1 && !passed && turned_cells().are_all(children))
@@ -232,37 +275,34 @@ void FastBackend<S>::prepare(int level) {
 
 template <class S>
 void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<double>::kLanes],
-                                   Pack<double> (&full)[24][24]) const {
+                                   Pack<double> (&out)[kEntries]) const {
   using P = Pack<double>;
   const PatchedLevel& packed = levels_[level].patched;
-  bool any_folded = false;
   if (level == 0) {
     const FinestLanes<double> lanes(packed, rotations_, scale_, cells);
-    corner_matrices(packed, materials<double>(), lanes, full);
-    if (lanes.any_folded) fold_matrices<P>(packed, cells, full);
-    if (lanes.any_held) mask_matrices(packed, lanes, full);
-    return;
+    corner_matrices(packed, materials<double>(), lanes, out);
+    if (lanes.any_folded) fold_matrices<P>(packed, cells, out);
+    if (lanes.any_held) mask_matrices(packed, lanes, out);
+  } else {
+    bool any_folded = false;
+    std::int32_t lanes[Pack<S>::kLanes];
+    std::fill(std::begin(lanes), std::end(lanes), -1);
+    for (int k = 0; k < P::kLanes; ++k) {
+      if (cells[k] < 0) continue;
+      lanes[k] = packed.lane[cells[k]];
+      any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
+    }
+    Pack<S> entries[kEntries];
+    gather_matrices(level, lanes, entries);
+    for (int e = 0; e < kEntries; ++e)
+      for (int k = 0; k < P::kLanes; ++k) out[e].set(k, static_cast<double>(entries[e][k]));
+    kernels::corners_from_modes<P>(out, out);
+    if (any_folded) fold_matrices<P>(packed, cells, out);
   }
-  std::int32_t lanes[Pack<S>::kLanes];
-  std::fill(std::begin(lanes), std::end(lanes), -1);
-  for (int k = 0; k < P::kLanes; ++k) {
-    if (cells[k] < 0) continue;
-    lanes[k] = packed.lane[cells[k]];
-    any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
-  }
-  Pack<S> entries[kEntries];
-  P exact[kEntries];
-  gather_matrices(level, lanes, entries);
-  for (int e = 0; e < kEntries; ++e)
-    for (int k = 0; k < P::kLanes; ++k) exact[e].set(k, static_cast<double>(entries[e][k]));
-  full_from_modes(exact, full);
-  if (any_folded) fold_matrices<P>(packed, cells, full);
 }
 
-void read_lane(const Pack<double> (&full)[24][24], int lane, std::span<double> out) {
-  for (int i = 0; i < 24; ++i)
-    for (int j = 0; j <= i; ++j)
-      out[static_cast<std::size_t>(kernels::packed_index(i, j))] = full[i][j][lane];
+void read_lane(const Pack<double> (&entries)[kEntries], int lane, std::span<double> out) {
+  for (int e = 0; e < kEntries; ++e) out[static_cast<std::size_t>(e)] = entries[e][lane];
 }
 
 template <class S>
@@ -270,9 +310,9 @@ void FastBackend<S>::read_cell_matrix(int level, std::int32_t cell, std::span<do
   std::int32_t cells[Pack<double>::kLanes];
   std::fill(std::begin(cells), std::end(cells), -1);
   cells[0] = cell;
-  Pack<double> full[24][24];
-  read_matrices(level, cells, full);
-  read_lane(full, 0, out);
+  Pack<double> entries[kEntries];
+  read_matrices(level, cells, entries);
+  read_lane(entries, 0, out);
 }
 
 /// The matrices of the coarsest level, several cells at a time.
@@ -281,15 +321,26 @@ void FastBackend<S>::assemble_coarsest(bool definite) {
   constexpr double kRounding = 1e-6;
   constexpr int kLanes = Pack<double>::kLanes;
   const Level& level = hierarchy_->levels.back();
-  Pack<double> full[24][24];
-  coarsest_->assemble(level, [&](std::int32_t cell, std::span<double> out) {
-    if (cell % kLanes == 0) {
-      std::int32_t cells[kLanes];
-      for (int k = 0; k < kLanes; ++k) cells[k] = cell + k < level.cells() ? cell + k : -1;
-      read_matrices(static_cast<int>(levels_.size()) - 1, cells, full);
+  const int last = static_cast<int>(levels_.size()) - 1;
+  std::vector<double> matrices(kEntries * static_cast<std::size_t>(level.cells()));
+  const auto of = [&](std::int32_t cell) {
+    return std::span(matrices).subspan(kEntries * static_cast<std::size_t>(cell), kEntries);
+  };
+  for_patches(0, (level.cells() + kLanes - 1) / kLanes, threads_, [&](std::int32_t n) {
+    std::int32_t cells[kLanes];
+    for (int k = 0; k < kLanes; ++k) {
+      const std::int32_t cell = kLanes * n + k;
+      cells[k] = cell < level.cells() ? cell : -1;
     }
-    read_lane(full, cell % kLanes, out);
-    if (definite) make_definite(out, kRounding);
+    Pack<double> entries[kEntries];
+    read_matrices(last, cells, entries);
+    for (int k = 0; k < kLanes && cells[k] >= 0; ++k) {
+      read_lane(entries, k, of(cells[k]));
+      if (definite) make_definite(of(cells[k]), kRounding);
+    }
+  });
+  coarsest_->assemble(level, [&](std::int32_t cell, std::span<double> out) {
+    std::copy_n(of(cell).begin(), kEntries, out.begin());
   });
 }
 

@@ -7,8 +7,16 @@
 #include <span>
 
 #include "cpu/patched_level.hpp"
+#include "kernels/transfer.hpp"
 
 namespace kerf::cpu {
+
+/// How the matrix of a child comes to its parent.
+enum class ChildWay {
+  octant,  ///< over the corners of an octant
+  whole,   ///< a child that is passed on, over its corners
+  slots    ///< held by slots of which some lie elsewhere
+};
 
 /// Children of some coarse cells: those of level 0 that no held component concerns, one an octant,
 /// and all others.
@@ -30,15 +38,17 @@ class GeneralChildren {
   bool any_plain() const { return any_plain_; }
   /// [octant][kGroup]: their lanes, -1: none.
   const std::int32_t* plain() const { return plain_; }
-  /// The n-th of the others that each lane has of an octant, -1: none. False where no lane has one.
-  bool others(int octant, int n, std::int32_t* out) const {
+  /// The n-th of the others that each lane has of an octant and a way, -1: none. False where no
+  /// lane has one. Those that are passed on are of octant 0.
+  bool others(int octant, int n, ChildWay way, std::int32_t* out) const {
     bool any = false;
     for (int k = 0; k < lanes_; ++k) {
       out[k] = -1;
       int left = n;
       for (const std::int32_t child : of(k)) {
         if (from_.level->place[child] % 8 != octant || from_.held[child] == kWhollyHeld ||
-            plain_[plain_place(child, k)] == from_.lane[child] || left-- > 0)
+            plain_[plain_place(child, k)] == from_.lane[child] || way_of(child) != way ||
+            left-- > 0)
           continue;
         out[k] = child;
         any = true;
@@ -52,6 +62,12 @@ class GeneralChildren {
   std::span<const std::int32_t> of(int k) const {
     if (cells_[k] < 0) return {};
     return to_.level->children_of(cells_[k]);
+  }
+  ChildWay way_of(std::int32_t child) const {
+    if (!from_.kinds.empty() && from_.held[child] == kPartlyHeld &&
+        kernels::has_hanging(from_.level->fold[child]))
+      return ChildWay::slots;
+    return from_.level->place[child] == Level::kPassed ? ChildWay::whole : ChildWay::octant;
   }
   int plain_place(std::int32_t child, int k) const {
     return kGroup * (from_.level->place[child] % 8) + k;

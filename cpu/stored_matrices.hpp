@@ -17,10 +17,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <type_traits>
 #include <vector>
 
+#include "cpu/lane_picker.hpp"
 #include "cpu/patched_level.hpp"
 #include "kernels/mode_coarsen.hpp"
 #include "kernels/rotation.hpp"
@@ -71,70 +71,6 @@ inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
 #endif
 }
 
-/// One entry of the cells in a pack.
-struct alignas(kPackBytes / 2) CodeLanes {
-  std::int16_t at[Pack<float>::kLanes];
-};
-
-/// Brings some lanes of the codes of a group to lanes of a pack.
-class LanePicker {
- public:
-#if KERF_PACK_BITS == 512
-  void pick(int to, int from) {
-    from_[to] = static_cast<std::int16_t>(from);
-    picks_ |= static_cast<__mmask16>(1U << to);
-  }
-  /// Where it picks none, zero if this is the first, else what was there.
-  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
-    auto* out = reinterpret_cast<__m256i*>(to.at);
-    const __m256i order = _mm256_load_si256(reinterpret_cast<const __m256i*>(from_));
-    const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
-    const __m256i before = first ? _mm256_setzero_si256() : _mm256_load_si256(out);
-    _mm256_store_si256(out, _mm256_mask_permutexvar_epi16(before, picks_, order, codes));
-  }
-
- private:
-  __mmask16 picks_ = 0;
-  alignas(32) std::int16_t from_[16] = {};
-#elif KERF_PACK_BITS == 256
-  LanePicker() { std::memset(bytes_, 0x80, sizeof bytes_); }  // zero
-  void pick(int to, int from) {
-    std::uint8_t* const bytes = bytes_[from / 8] + 2 * to;
-    bytes[0] = static_cast<std::uint8_t>(2 * (from % 8));
-    bytes[1] = static_cast<std::uint8_t>(bytes[0] + 1);
-  }
-  /// Where it picks none, zero if this is the first, else what was there.
-  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
-    auto* out = reinterpret_cast<__m128i*>(to.at);
-    const auto half = [&](int n) {
-      const __m128i order = _mm_load_si128(reinterpret_cast<const __m128i*>(bytes_[n]));
-      const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from + 8 * n));
-      return _mm_shuffle_epi8(codes, order);
-    };
-    const __m128i picked = _mm_or_si128(half(0), half(1));
-    _mm_store_si128(out, first ? picked : _mm_or_si128(picked, _mm_load_si128(out)));
-  }
-
- private:
-  alignas(16) std::uint8_t bytes_[kGroup / 8][16];
-#else
-  LanePicker() { std::fill(std::begin(from_), std::end(from_), -1); }
-  void pick(int to, int from) { from_[to] = from; }
-  /// Where it picks none, zero if this is the first, else what was there.
-  void add(const std::int16_t* from, bool first, CodeLanes& to) const {
-    for (int k = 0; k < Pack<float>::kLanes; ++k) {
-      if (from_[k] >= 0)
-        to.at[k] = from[from_[k]];
-      else if (first)
-        to.at[k] = 0;
-    }
-  }
-
- private:
-  int from_[Pack<float>::kLanes];
-#endif
-};
-
 /// Entries of a group as packs. Each read asks memory for what lies a group or somewhat more ahead:
 /// all of it at once, before the product, gained nothing.
 template <class S>
@@ -154,6 +90,8 @@ struct CodedEntries {
     return widened(from + kGroup * entry);
   }
 };
+
+static_assert(LaneSources<float>::kStride == kGroup);
 
 template <class S>
 class StoredMatrices {
@@ -246,29 +184,12 @@ class StoredMatrices {
   }
 
   /// The entries of single cells, one a lane (-1: none), and zero where they are not stored or the
-  /// cell is turned. Entry by entry, so that those of the lanes come from memory side by side.
+  /// cell is turned.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
-    int count = 0;
-    if constexpr (std::is_same_v<S, float>) count = gather_codes(lanes, out);
-    std::fill(out + count, out + kernels::kEntries, P(0));
-    struct Plain {
-      int lane, count;
-      const S* from;
-    } plain[P::kLanes];
-    int size = 0, most = 0;
-    for (int k = 0; k < P::kLanes; ++k) {
-      if (lanes[k] < 0) continue;
-      const auto lane = static_cast<std::size_t>(lanes[k]);
-      const std::size_t group = lane / kGroup;
-      if ((traits_[group] & (kNone | kCoded | kTurned)) != 0) continue;
-      plain[size++] = {k, entries_of(group),
-                       plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup};
-      most = std::max(most, entries_of(group));
-    }
-    for (int e = 0; e < most; ++e)
-      for (int n = 0; n < size; ++n)
-        if (e < plain[n].count)
-          out[e].set(plain[n].lane, plain[n].from[kGroup * static_cast<std::size_t>(e)]);
+    if constexpr (std::is_same_v<S, float>)
+      gather_packs(lanes, out);
+    else
+      gather_scalars(lanes, out);
   }
 
  private:
@@ -292,31 +213,59 @@ class StoredMatrices {
     return with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
   }
 
-  /// What gather does for lanes with codes, group by group, since cells side by side mostly have
-  /// parents side by side; zero in the others. Returns how many entries it wrote.
-  int gather_codes(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
-    LanePicker pickers[P::kLanes];
-    const std::int16_t* from[P::kLanes];
+  bool is_stored(std::size_t group) const { return (traits_[group] & (kNone | kTurned)) == 0; }
+
+  void gather_packs(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
+    LaneSources<std::int16_t> codes;
+    LaneSources<S> plain, full;  // those of `plain` that have all entries
     alignas(kPackBytes) S unit[P::kLanes] = {};
-    int groups = 0, count = 0;
+    int coded = 0;  // entries of all groups with codes
     for (int k = 0; k < P::kLanes; ++k) {
       if (lanes[k] < 0) continue;
-      const std::size_t group = static_cast<std::size_t>(lanes[k]) / kGroup;
-      if (!is_coded(group) || (traits_[group] & (kNone | kTurned)) != 0) continue;
-      unit[k] = unit_[static_cast<std::size_t>(lanes[k])];
-      const std::int16_t* const its = codes_.data() + kGroup * std::size_t{begin_[group]};
-      const auto n = static_cast<int>(std::find(from, from + groups, its) - from);
-      if (n == groups) from[groups++] = its;
-      pickers[n].pick(k, lanes[k] % kGroup);
-      count = entries_of(group);  // of all groups with codes alike
+      const auto lane = static_cast<std::size_t>(lanes[k]);
+      const std::size_t group = lane / kGroup, at = kGroup * std::size_t{begin_[group]};
+      const int within = lanes[k] % kGroup;
+      if (!is_stored(group)) continue;
+      if (is_coded(group)) {
+        unit[k] = unit_[lane];
+        codes.add(k, codes_.data() + at, within);
+        coded = entries_of(group);
+      } else {
+        plain.add(k, plain_.data() + at, within);
+        if (with_translations(group)) full.add(k, plain_.data() + at, within);
+      }
     }
+    constexpr int kSome = kernels::kModeEntries, kAll = kernels::kEntries;
     const P units = load_pack(unit);
-    for (int e = 0; e < count; ++e) {
-      CodeLanes codes;
-      for (int n = 0; n < groups; ++n) pickers[n].add(from[n] + kGroup * e, n == 0, codes);
-      out[e] = units * widened(codes.at);
+    const auto widen = [](const std::int16_t* from) { return widened(from); };
+    const auto load = [](const S* from) { return load_pack(from); };
+    codes.gather(0, coded, widen, units, false, out);
+    std::fill(out + (plain.empty() ? coded : std::max(coded, kSome)), out + kAll, P(S(0)));
+    plain.gather(0, kSome, load, P(S(1)), coded > 0, out);
+    full.gather(kSome, kAll, load, P(S(1)), true, out);
+  }
+
+  /// Entry by entry, so that those of the lanes come from memory side by side.
+  void gather_scalars(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
+    std::fill(out, out + kernels::kEntries, P(0));
+    struct Plain {
+      int lane, count;
+      const S* from;
+    } plain[P::kLanes];
+    int size = 0, most = 0;
+    for (int k = 0; k < P::kLanes; ++k) {
+      if (lanes[k] < 0) continue;
+      const auto lane = static_cast<std::size_t>(lanes[k]);
+      const std::size_t group = lane / kGroup;
+      if (!is_stored(group)) continue;
+      plain[size++] = {k, entries_of(group),
+                       plain_.data() + kGroup * std::size_t{begin_[group]} + lane % kGroup};
+      most = std::max(most, entries_of(group));
     }
-    return count;
+    for (int e = 0; e < most; ++e)
+      for (int n = 0; n < size; ++n)
+        if (e < plain[n].count)
+          out[e].set(plain[n].lane, plain[n].from[kGroup * static_cast<std::size_t>(e)]);
   }
 
   void encode(std::size_t group, int first, int count, const P (&entries)[kernels::kEntries]) {

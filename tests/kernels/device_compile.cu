@@ -3,6 +3,7 @@
 // Compiled wherever nvcc is found, never run: the headers of kernels/ must be code for a device,
 // templates instantiated, also while no backend calls them there.
 #include "kernels/coarsen.hpp"
+#include "kernels/corner_coarsen.hpp"
 #include "kernels/corotate.hpp"
 #include "kernels/fma.hpp"
 #include "kernels/hex_element.hpp"
@@ -79,6 +80,11 @@ __global__ void touch_modes(const FinestChild<T>* finest, T* corners, T* matrice
                                       entries(coarse, cell));
   corners_from_modes<T>(matrix, entries(corners, cell));
   modes_from_corners<T>(entries(corners, cell), matrix);
+  coarsen_corners<T>(
+      [&](int o, T(&child)[kEntries]) {
+        for (int e = 0; e < kEntries; ++e) child[e] = entries(corners, cell + o)[e];
+      },
+      present, entries(coarse, cell));
 
   Sym3<T> D[kCorners];
   finest_diagonal_blocks(R, children[0].stiffness, children[0].mass, constants, D);

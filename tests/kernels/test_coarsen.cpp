@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <vector>
+
 #include "kernels/coarsen.hpp"
+#include "kernels/corner_coarsen.hpp"
 #include "kernels/transfer.hpp"
 #include "tests/kernels/kernel_values.hpp"
 
@@ -129,6 +134,37 @@ TEST(CoarsenCell, APassedCellIsCopied) {
   kernels::transfer_weights(0, kernels::kPassed, 0, w);
   kernels::coarsen_cell(packed.data(), w, coarse.data());
   EXPECT_EQ(coarse, packed);
+}
+
+TEST(CoarsenCorners, IsTheSumOfWhatChildrenGiveOneByOne) {
+  Random random(57);
+  for (const unsigned present : {0xFFU, 0x01U, 0x80U, 0x0FU, 0xF0U, 0x55U, 0xAAU, 0x33U, 0x6DU}) {
+    std::array<std::vector<double>, 8> children;
+    std::vector<double> expected(kEntries), out(kEntries, 1e30);
+    std::vector<int> asked;
+    for (int o = 0; o < 8; ++o) {
+      children[static_cast<std::size_t>(o)] = to_packed<double>(random.symmetric24());
+      if (((present >> o) & 1U) == 0) continue;
+      double w[8][8];
+      kernels::transfer_weights(kernels::fold_code(0, o), o, kernels::fold_code(0, 0), w);
+      kernels::coarsen_cell(children[static_cast<std::size_t>(o)].data(), w, expected.data());
+    }
+
+    kernels::coarsen_corners<double>(
+        [&](int o, double(&entries)[kEntries]) {
+          asked.push_back(o);
+          const auto& from = children[static_cast<std::size_t>(o)];
+          std::copy(from.begin(), from.end(), entries);
+        },
+        present, out.data());
+
+    const Matrix24 A = from_packed(out), B = from_packed(expected);
+    EXPECT_LT((A - B).norm(), kRoundOff * B.norm()) << present;
+    std::vector<int> rising;
+    for (int o = 0; o < 8; ++o)
+      if (((present >> o) & 1U) != 0) rising.push_back(o);
+    EXPECT_EQ(asked, rising) << present;
+  }
 }
 
 }  // namespace

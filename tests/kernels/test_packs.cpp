@@ -3,6 +3,7 @@
 // What brings points into the lanes of packs and back, against loops over single lanes.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -185,11 +186,11 @@ TYPED_TEST(PointsOfPacks, RotationsOfCellsAreThoseOfTheirLanes) {
     for (int k = 0; k < Pack<S>::kLanes; ++k) lanes[k] = lane_of(k);
     kernels::Quat<Pack<S>> q;
     cpu::load_rotations(cells, lanes.data(), q);
-    for (int k = 0; k < Pack<S>::kLanes; ++k) {
-      const S* const from = lanes[k] < 0 ? nullptr : cells.rotation(std::size_t(lanes[k]));
+    for (int k = 0; k < Pack<S>::kLanes; ++k) {  // of an absent cell, one of any other
+      const S* const from = cells.rotation(std::size_t(std::max(lanes[k], 0)));
       const Pack<S>* const found[] = {&q.w, &q.x, &q.y, &q.z};
       for (int c = 0; c < 4; ++c)
-        EXPECT_EQ((*found[c])[k], from ? from[cpu::kGroup * c] : S(c == 0 ? 1 : 0))
+        EXPECT_EQ((*found[c])[k], from[cpu::kGroup * c])
             << "lane " << lanes[k] << ", component " << c;
     }
   };
@@ -264,20 +265,48 @@ TEST(Codes, ComeBackAsTheNearestIntegers) {
   for (int k = 3; k < kLanes; ++k) EXPECT_EQ(back[k], 1000.0F * static_cast<float>(k - 4));
 }
 
-TEST(Codes, OfAGroupGoToOtherLanes) {
+TEST(Lanes, GoToOtherLanesAndLeaveTheRest) {
   constexpr int kLanes = Pack<float>::kLanes;
-  std::array<std::int16_t, cpu::kGroup> from;
-  std::iota(from.begin(), from.end(), std::int16_t{100});
-  cpu::CodeLanes to;
-  cpu::LanePicker some, others;
-  for (int k = 0; k < kLanes; k += 2) some.pick(k, cpu::kGroup - 1 - k);
-  others.pick(1, 3);
+  Pack<float> from, rest(-1);
+  for (int k = 0; k < kLanes; ++k) from.set(k, static_cast<float>(100 + k));
+  cpu::LanePicks picks{};
+  for (int k = 0; k < kLanes; k += 2) picks.pick(k, kLanes - 1 - k);
 
-  some.add(from.data(), true, to);
-  others.add(from.data(), false, to);
+  const Pack<float> to = cpu::LanePicker(picks)(from, rest);
 
   for (int k = 0; k < kLanes; ++k)
-    EXPECT_EQ(to.at[k], k == 1 ? 103 : k % 2 == 0 ? 100 + cpu::kGroup - 1 - k : 0) << k;
+    EXPECT_EQ(to[k], k % 2 == 0 ? static_cast<float>(100 + kLanes - 1 - k) : -1) << k;
+}
+
+TEST(Lanes, AreGatheredFromAnyNumberOfGroups) {
+  constexpr int kLanes = Pack<float>::kLanes, kEntries = 3;
+  std::vector<std::int16_t> entries(std::size_t{cpu::kGroup} * kEntries * kLanes);
+  std::iota(entries.begin(), entries.end(), std::int16_t{1});
+  const auto widen = [](const std::int16_t* x) { return cpu::widened(x); };
+  for (int groups = 1; groups <= kLanes; ++groups) {
+    cpu::LaneSources<std::int16_t> sources;
+    EXPECT_TRUE(sources.empty());
+    const auto at = [&](int k) {  // group, and lane of it
+      return std::pair{std::size_t(k % groups), (7 * k + 3) % cpu::kGroup};
+    };
+    const int none = kLanes / 2;
+    for (int k = 0; k < kLanes; ++k)
+      if (const auto [group, lane] = at(k); k != none)
+        sources.add(k, entries.data() + cpu::kGroup * kEntries * group, lane);
+    Pack<float> out[kEntries] = {Pack<float>(7), Pack<float>(7), Pack<float>(7)};
+
+    sources.gather(0, 2, widen, Pack<float>(2), false, out);
+    sources.gather(1, 3, widen, Pack<float>(1), true, out);
+
+    for (int e = 0; e < kEntries; ++e)
+      for (int k = 0; k < kLanes; ++k) {
+        const auto [group, lane] = at(k);
+        const std::size_t from =
+            cpu::kGroup * (kEntries * group + std::size_t(e)) + std::size_t(lane);
+        const float entry = k == none ? 0 : entries[from];
+        EXPECT_EQ(out[e][k], e == 0 ? 2 * entry : e == 1 ? 3 * entry : 7 + entry) << e << " " << k;
+      }
+  }
 }
 
 TYPED_TEST(PointsOfPacks, AndMasksHoldOnlyInEveryLane) {
