@@ -1,104 +1,29 @@
 // SPDX-License-Identifier: MIT
 //
-// Numbers of a Cholesky factor in fronts. Eliminated in double; kept in the scalars of the cycle,
-// which leaves a factor of a matrix as near to A as those that single precision makes elsewhere,
-// and positive definite as before. The same bits for any number of threads.
+// Numbers of a Cholesky factor in fronts. Eliminated in double; kept in the scalars of the cycle.
+// The same bits for any number of threads.
+//
+// Of a front with the columns (L over its own rows, K over those below) what is kept is
+// G = (L^-1, -K L^-1). Solving is then a product with G in each front, forward, and one with its
+// transpose, backward: sums that do not wait for each other, where substitution is one long chain.
+// What solves is M^T M, with M the product of these steps, so rounded numbers make an operator that
+// is symmetric and positive definite as well. Its error, in the norm of the matrix A, is some
+// eps sqrt(cond A), as with L.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "cpu/dense_front.hpp"
 #include "cpu/fronts.hpp"
 #include "cpu/patch_draft.hpp"
 #include "cpu/patch_sweep.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::cpu {
-
-/// Fronts are padded to four rows, so packs are no wider where a register is.
-using FrontPack = Pack<double, 32>;
-inline FrontPack four_at(const double* from) { return load_pack<double, 32>(from); }
-
-/// A dense symmetric matrix by columns, of which the first `columns` are eliminated. Sizes are
-/// multiples of four, and columns begin `stride` scalars apart.
-class DenseFront {
- public:
-  using P = FrontPack;
-
-  DenseFront(double* values, int height, int columns, std::size_t stride)
-      : values_(values), height_(height), columns_(columns), stride_(stride) {}
-
-  double* column(int j) const { return values_ + stride_ * static_cast<std::size_t>(j); }
-
-  /// Columns of L, and in the others what is left of the matrix. accept(j, pivot) says whether to
-  /// go on; returns whether it always did.
-  template <class Accept>
-  bool eliminate(const Accept& accept) const {
-    for (int j = 0; j < height_; j += 4) {
-      subtract(j, std::min(j, columns_));
-      if (j < columns_ && !(factor_block(j, accept))) return false;
-    }
-    return true;
-  }
-
- private:
-  /// Four columns from j on, less their part in the first `count` columns of L.
-  void subtract(int j, int count) const {
-    int i = j;
-    for (; i + 12 <= height_; i += 12) subtract_tile<3>(i, j, count);
-    for (; i < height_; i += 4) subtract_tile<1>(i, j, count);
-  }
-
-  template <int kPacks>
-  void subtract_tile(int i, int j, int count) const {
-    P sum[kPacks][4];
-    for (int q = 0; q < 4; ++q)
-      for (int p = 0; p < kPacks; ++p) sum[p][q] = four_at(column(j + q) + i + 4 * p);
-    for (int k = 0; k < count; ++k) {
-      const double* const left = column(k);
-      P at[kPacks];
-      for (int p = 0; p < kPacks; ++p) at[p] = four_at(left + i + 4 * p);
-      for (int q = 0; q < 4; ++q) {
-        const P factor = P(-left[j + q]);
-        for (int p = 0; p < kPacks; ++p) sum[p][q] = fma(at[p], factor, sum[p][q]);
-      }
-    }
-    for (int q = 0; q < 4; ++q)
-      for (int p = 0; p < kPacks; ++p) store_pack(column(j + q) + i + 4 * p, sum[p][q]);
-  }
-
-  template <class Accept>
-  bool factor_block(int j, const Accept& accept) const {
-    double inverse[4];
-    for (int q = 0; q < 4; ++q) {
-      double* const at = column(j + q) + j;
-      for (int k = 0; k < q; ++k)
-        for (int i = q; i < 4; ++i) at[i] -= column(j + k)[j + i] * column(j + k)[j + q];
-      if (!accept(j + q, at[q])) return false;
-      at[q] = std::sqrt(at[q]);
-      inverse[q] = 1 / at[q];
-      for (int i = 0; i < q; ++i) at[i] = 0;
-      for (int i = q + 1; i < 4; ++i) at[i] *= inverse[q];
-    }
-    for (int i = j + 4; i < height_; i += 4) {
-      P x[4];
-      for (int q = 0; q < 4; ++q) {
-        x[q] = four_at(column(j + q) + i);
-        for (int k = 0; k < q; ++k) x[q] = fma(x[k], P(-column(j + k)[j + q]), x[q]);
-        x[q] *= P(inverse[q]);
-        store_pack(column(j + q) + i, x[q]);
-      }
-    }
-    return true;
-  }
-
-  double* values_;
-  int height_, columns_;
-  std::size_t stride_;
-};
 
 template <class S>
 class FrontFactor {
@@ -108,12 +33,12 @@ class FrontFactor {
   void analyse(const Level& level, const AssembledLevel& matrix) {
     fronts_ = Fronts(level, matrix);
     rest_.assign(fronts_.all.size(), {});
+    local_.assign(fronts_.branches.size() + 1, {});
   }
 
   /// False if a pivot is not positive, or next to nothing beside its diagonal entry.
   bool factor(const AssembledLevel& matrix, int threads) {
     values_.resize(fronts_.entries);
-    inverse_.resize(fronts_.pivots);
     for (std::vector<double>& rest : rest_) rest = {};  // of one that failed
     std::atomic<bool> good = true;
     using Buffer = PointBuffer<double>;
@@ -129,39 +54,48 @@ class FrontFactor {
 
   /// In place. Each branch has a copy of x, so that what they add to rows of the trunk meets in
   /// one order.
-  void solve(std::span<double> x, int threads) const {
+  void solve(std::span<double> x, int threads) {
     constexpr std::size_t kWorthEntries = 65536;  // below, waking the threads costs more
     if (fronts_.entries < kWorthEntries) threads = 1;
-    const std::size_t count = fronts_.branches.size();
-    std::vector<std::vector<double>> local(count, std::vector<double>(x.begin(), x.end()));
-    std::vector<double> work;
+    const std::size_t vertices = x.size() / 3;
+    for (Array<double>& local : local_) local.resize(4 * vertices);
+    double* const whole = local_[0].data();
+    for (std::size_t v = 0; v < vertices; ++v) {
+      std::copy_n(x.data() + 3 * v, 3, whole + 4 * v);
+      whole[4 * v + 3] = 0;
+    }
     const auto each_branch = [&](const auto& body) {
-      for_patches(
-          0, static_cast<std::int32_t>(count), threads,
-          [] { return std::make_unique<std::vector<double>>(); },
-          [&](std::int32_t b, std::vector<double>& own) { body(std::size_t(b), own); });
+      for_patches(0, static_cast<std::int32_t>(fronts_.branches.size()), threads,
+                  [&](std::int32_t b) {
+                    body(fronts_.branches[b], local_[static_cast<std::size_t>(b) + 1].data());
+                  });
     };
-    each_branch([&](std::size_t b, std::vector<double>& own) {
-      for (const int f : fronts_.trunk) clear(fronts_.all[f], local[b]);
-      for (const int f : fronts_.branches[b]) go_forward(fronts_.all[f], local[b], own);
+    each_branch([&](const std::vector<int>& branch, double* local) {
+      std::copy_n(whole, 4 * vertices, local);
+      for_trunk([&](std::size_t i) { store_pack(local + i, P(0)); });
+      for (const int f : branch) go_forward(fronts_.all[f], local);
     });
-    for (const std::vector<double>& from : local)
-      for (const int f : fronts_.trunk) add(fronts_.all[f], from, x);
-    for (const int f : fronts_.trunk) go_forward(fronts_.all[f], x, work);
+    for (std::size_t b = 1; b < local_.size(); ++b)
+      for_trunk([&](std::size_t i) {
+        store_pack(whole + i, four_at(whole + i) + four_at(local_[b].data() + i));
+      });
+    for (const int f : fronts_.trunk) go_forward(fronts_.all[f], whole);
     for (auto f = fronts_.trunk.rbegin(); f != fronts_.trunk.rend(); ++f)
-      go_backward(fronts_.all[*f], x, work);
-    each_branch([&](std::size_t b, std::vector<double>& own) {
-      for (const int f : fronts_.trunk) take(fronts_.all[f], x, local[b]);
-      const std::vector<int>& branch = fronts_.branches[b];
+      go_backward(fronts_.all[*f], whole);
+    each_branch([&](const std::vector<int>& branch, double* local) {
+      for_trunk([&](std::size_t i) { store_pack(local + i, four_at(whole + i)); });
       for (auto f = branch.rbegin(); f != branch.rend(); ++f) {
-        go_backward(fronts_.all[*f], local[b], own);
-        take(fronts_.all[*f], local[b], x);
+        go_backward(fronts_.all[*f], local);
+        for (const int v : fronts_.all[*f].vertices) std::copy_n(local + 4 * v, 3, whole + 4 * v);
       }
     });
+    for (std::size_t v = 0; v < vertices; ++v) std::copy_n(whole + 4 * v, 3, x.data() + 3 * v);
   }
 
   std::size_t bytes() const {
-    return values_.capacity() * sizeof(S) + inverse_.capacity() * sizeof(double);
+    std::size_t sum = values_.capacity() * sizeof(S);
+    for (const Array<double>& local : local_) sum += bytes_of(local);
+    return sum;
   }
 
  private:
@@ -188,8 +122,9 @@ class FrontFactor {
       return j >= front.columns() || pivot > kSingular * diagonal(matrix, front, j);
     };
     if (!dense.eliminate(accept)) return false;
-    keep(front, dense);
     keep_rest(front, dense, rest_[n]);
+    dense.invert();
+    keep(front, dense);
     return true;
   }
 
@@ -198,13 +133,12 @@ class FrontFactor {
     return matrix.value[matrix.column_begin[scalar(front, j)]];
   }
 
-  /// Columns below their diagonal block of four, and that block below its diagonal.
   void keep(const Front& front, const DenseFront& dense) {
     S* to = values_.data() + front.at;
     for (int j = 0; j < front.padded_columns(); ++j, to += front.height()) {
       const double* const from = dense.column(j);
-      inverse_[front.pivots_at + static_cast<std::size_t>(j)] = 1 / from[j];
-      for (int i = j + 1; i < front.height(); ++i) to[i] = static_cast<S>(from[i]);
+      std::fill_n(to, j, S(0));
+      for (int i = j; i < front.height(); ++i) to[i] = static_cast<S>(from[i]);
     }
   }
 
@@ -228,117 +162,103 @@ class FrontFactor {
     rest = {};
   }
 
-  void go_forward(const Front& front, std::span<double> x, std::vector<double>& work) const {
-    load(front, x, work);
-    forward(front, work.data());
-    store(front, work, front.rows.size(), x);
-  }
-  void go_backward(const Front& front, std::span<double> x, std::vector<double>& work) const {
-    load(front, x, work);
-    backward(front, work.data());
-    store(front, work, 0, x);
-  }
+  // Vectors here have four scalars a vertex, the last one any number, so that three of them go in
+  // one piece, with what is behind them.
 
-  /// body(scalar) for those that a front eliminates.
+  /// body(first scalar) for the vertices that fronts of the trunk eliminate.
   template <class Body>
-  static void for_scalars(const Front& front, const Body& body) {
-    for (const int v : front.vertices)
-      for (std::size_t c = 0; c < 3; ++c) body(3 * static_cast<std::size_t>(v) + c);
+  void for_trunk(const Body& body) const {
+    for (const int f : fronts_.trunk)
+      for (const int v : fronts_.all[f].vertices) body(4 * static_cast<std::size_t>(v));
   }
-  static void clear(const Front& front, std::span<double> x) {
-    for_scalars(front, [&](std::size_t i) { x[i] = 0; });
+  /// The vertices side by side, up to `end`.
+  static void load(const std::vector<int>& vertices, const double* x, double* to, double* end) {
+    for (const int v : vertices) {
+      store_pack(to, four_at(x + 4 * v));
+      to += 3;
+    }
+    std::fill(to, end, 0.0);
   }
-  static void add(const Front& front, std::span<const double> from, std::span<double> x) {
-    for_scalars(front, [&](std::size_t i) { x[i] += from[i]; });
-  }
-  static void take(const Front& front, std::span<const double> from, std::span<double> x) {
-    for_scalars(front, [&](std::size_t i) { x[i] = from[i]; });
-  }
-
-  static void load(const Front& front, std::span<const double> x, std::vector<double>& work) {
-    work.assign(static_cast<std::size_t>(front.height()), 0.0);
-    const auto put = [&](const std::vector<int>& vertices, std::size_t at) {
-      for (const int v : vertices)
-        for (std::size_t c = 0; c < 3; ++c) work[at++] = x[3 * static_cast<std::size_t>(v) + c];
-    };
-    put(front.vertices, 0);
-    put(front.rows, static_cast<std::size_t>(front.padded_columns()));
-  }
-  static void store(const Front& front, const std::vector<double>& work, std::size_t rows,
-                    std::span<double> x) {
-    const auto take = [&](const std::vector<int>& vertices, std::size_t count, std::size_t at) {
-      for (std::size_t n = 0; n < count; ++n)
-        for (std::size_t c = 0; c < 3; ++c)
-          x[3 * static_cast<std::size_t>(vertices[n]) + c] = work[at++];
-    };
-    take(front.vertices, front.vertices.size(), 0);
-    take(front.rows, rows, static_cast<std::size_t>(front.padded_columns()));
+  static void store(const std::vector<int>& vertices, const double* from, double* x) {
+    for (const int v : vertices) {
+      store_pack(x + 4 * v, four_at(from));
+      from += 3;
+    }
   }
 
-  static void load_four(const S* from, P& out) {
-    typedef S Four __attribute__((vector_size(4 * sizeof(S))));
-    Four four;
-    __builtin_memcpy(&four, from, sizeof four);
-    out.v = __builtin_convertvector(four, P::Vector);
-  }
+  /// Room for the columns of a front, and for its columns and rows.
+  struct Work {
+    double *columns, *all, *rows, *end;
 
-  /// Four columns of a front.
-  struct Columns {
-    const S* at[4];
-    const double* inverse;  // of their pivots
+    explicit Work(const Front& front) {
+      thread_local PointBuffer<double> buffer;
+      constexpr int kAlign = kPackBytes / static_cast<int>(sizeof(double)), kBehind = 1;
+      const int width = (front.padded_columns() + kBehind + kAlign - 1) / kAlign * kAlign;
+      columns = buffer.reserve(static_cast<std::size_t>(width + front.height() + kBehind));
+      all = columns + width;
+      rows = all + front.padded_columns();
+      end = all + front.height();
+    }
   };
-  Columns columns_at(const Front& front, int j) const {
-    const auto height = static_cast<std::size_t>(front.height());
-    const S* const first = values_.data() + front.at + height * static_cast<std::size_t>(j);
-    return {{first, first + height, first + 2 * height, first + 3 * height},
-            inverse_.data() + front.pivots_at + j};
+  void go_forward(const Front& front, double* x) const {
+    const Work work(front);
+    load(front.vertices, x, work.columns, work.columns + front.padded_columns());
+    std::fill(work.all, work.rows, 0.0);
+    load(front.rows, x, work.rows, work.end);
+    forward(front, work.columns, work.all);
+    store(front.vertices, work.all, x);
+    store(front.rows, work.rows, x);
+  }
+  void go_backward(const Front& front, double* x) const {
+    const Work work(front);
+    load(front.vertices, x, work.all, work.rows);
+    load(front.rows, x, work.rows, work.end);
+    backward(front, work.all, work.columns);
+    store(front.vertices, work.columns, x);
   }
 
-  void forward(const Front& front, double* x) const {
+  using Wide = Pack<double>;
+  static constexpr int kWide = Wide::kLanes;
+  /// The first rows of four columns from j on that are not all zero, by packs.
+  static int first_row(int j) { return j / kWide * kWide; }
+  const S* column(const Front& front, int j) const {
+    return values_.data() + front.at +
+           static_cast<std::size_t>(front.height()) * static_cast<std::size_t>(j);
+  }
+
+  /// y += G x
+  void forward(const Front& front, const double* x, double* y) const {
+    const int height = front.height();
     for (int j = 0; j < front.padded_columns(); j += 4) {
-      const Columns columns = columns_at(front, j);
-      P factor[4];
-      for (int q = 0; q < 4; ++q) {
-        for (int k = 0; k < q; ++k)
-          x[j + q] -= static_cast<double>(columns.at[k][j + q]) * x[j + k];
-        x[j + q] *= columns.inverse[q];
-        factor[q] = P(-x[j + q]);
-      }
-      for (int i = j + 4; i < front.height(); i += 4) {
-        P sum = four_at(x + i), entries;
-        for (int q = 0; q < 4; ++q) {
-          load_four(columns.at[q] + i, entries);
-          sum = fma(entries, factor[q], sum);
-        }
-        store_pack(x + i, sum);
+      const S* const G = column(front, j);
+      const Wide factor[4] = {Wide(x[j]), Wide(x[j + 1]), Wide(x[j + 2]), Wide(x[j + 3])};
+      for (int i = first_row(j); i < height; i += kWide) {
+        Wide sum = load_pack(y + i);
+        kernels::unrolled<4>(
+            [&](auto q) { sum = fma(load_pack_as<double>(G + q * height + i), factor[q], sum); });
+        store_pack(y + i, sum);
       }
     }
   }
 
-  void backward(const Front& front, double* x) const {
-    for (int j = front.padded_columns() - 4; j >= 0; j -= 4) {
-      const Columns columns = columns_at(front, j);
-      P sum[4] = {P(0), P(0), P(0), P(0)};
-      for (int i = j + 4; i < front.height(); i += 4) {
-        const P at = four_at(x + i);
-        P entries;
-        for (int q = 0; q < 4; ++q) {
-          load_four(columns.at[q] + i, entries);
-          sum[q] = fma(entries, at, sum[q]);
-        }
+  /// x = G^T y
+  void backward(const Front& front, const double* y, double* x) const {
+    const int height = front.height();
+    for (int j = 0; j < front.padded_columns(); j += 4) {
+      const S* const G = column(front, j);
+      Wide sum[4] = {Wide(0), Wide(0), Wide(0), Wide(0)};
+      for (int i = first_row(j); i < height; i += kWide) {
+        const Wide at = load_pack(y + i);
+        kernels::unrolled<4>(
+            [&](auto q) { sum[q] = fma(load_pack_as<double>(G + q * height + i), at, sum[q]); });
       }
-      for (int q = 3; q >= 0; --q) {
-        double rest = x[j + q] - sum_lanes(sum[q]);
-        for (int k = q + 1; k < 4; ++k)
-          rest -= static_cast<double>(columns.at[q][j + k]) * x[j + k];
-        x[j + q] = rest * columns.inverse[q];
-      }
+      for (int q = 0; q < 4; ++q) x[j + q] = sum_lanes(sum[q]);
     }
   }
 
   Fronts fronts_;
-  std::vector<S> values_;                  // by front and column
-  std::vector<double> inverse_;            // of pivots
+  Array<S> values_;                        // by front and column of G
+  std::vector<Array<double>> local_;       // of solving: x, and one of each branch
   std::vector<std::vector<double>> rest_;  // per front, until the front above has it
 };
 

@@ -158,8 +158,6 @@ class Linking {
       for (const int v : out_.all[child].rows) out_.all[child].row_place.push_back(place_[v]);
     front.at = out_.entries;
     out_.entries += front.entries_of_factor();
-    front.pivots_at = out_.pivots;
-    out_.pivots += front.padded_columns();
     if (!front.rows.empty()) out_.all[front_of_[front.rows[0]]].below.push_back(f);
     if (out_.by_depth.size() <= static_cast<std::size_t>(front.depth))
       out_.by_depth.resize(front.depth + std::size_t{1});
@@ -201,15 +199,24 @@ void Fronts::part() {
     roots.insert(roots.end(), all[root].below.begin(), all[root].below.end());
   }
   std::sort(trunk.begin(), trunk.end());
+  // Small ones together: each branch has a copy of what is solved for.
+  constexpr std::size_t kMost = 16;
+  std::sort(roots.begin(), roots.end());
+  std::size_t in_branch = entries;
   for (const int root : roots) {
-    std::vector<int> branch{root};
-    for (std::size_t n = 0; n < branch.size(); ++n) {
+    if (kMost * in_branch >= entries) {
+      branches.emplace_back();
+      in_branch = 0;
+    }
+    std::vector<int>& branch = branches.back();
+    in_branch += size[root];
+    std::size_t n = branch.size();
+    for (branch.push_back(root); n < branch.size(); ++n) {
       const std::vector<int>& below = all[branch[n]].below;
       branch.insert(branch.end(), below.begin(), below.end());
     }
-    std::sort(branch.begin(), branch.end());
-    branches.push_back(std::move(branch));
   }
+  for (std::vector<int>& branch : branches) std::sort(branch.begin(), branch.end());
 }
 
 }  // namespace kerf::cpu

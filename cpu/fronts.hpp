@@ -7,8 +7,9 @@
 // the end, and each cut, is a front: its columns are eliminated together, from a dense matrix over
 // them and over the rows below in which they, or the fronts below them, have entries.
 //
-// Layout  A front has its columns first, up to a multiple of four, then its rows, up to a multiple
-//         of four: `height` places. What is between has ones on the diagonal and zeros else.
+// Layout  A front has its columns first, up to a multiple of four, then its rows; all up to a
+//         multiple of eight: `height` places. What is between has ones on the diagonal and zeros
+//         else.
 // Source  [G73] for nested dissection, [DR83] for fronts.
 #pragma once
 
@@ -30,26 +31,25 @@ struct Front {
   std::vector<int> rows;       // vertices, each eliminated by a later front
   std::vector<int> row_place;  // per vertex in rows: the place of its x in the front above
   std::vector<Entry> entries;
-  std::vector<int> below;     // fronts, rising
-  std::size_t at = 0;         // of its columns in the factor
-  std::size_t pivots_at = 0;  // of their pivots
-  int depth = 0;              // fronts below it have less
+  std::vector<int> below;  // fronts, rising
+  std::size_t at = 0;      // of its columns in the factor
+  int depth = 0;           // fronts below it have less
 
   int columns() const { return 3 * static_cast<int>(vertices.size()); }
   int padded_columns() const { return (columns() + 3) & ~3; }
   std::size_t entries_of_factor() const {
     return static_cast<std::size_t>(height()) * static_cast<std::size_t>(padded_columns());
   }
-  int height() const { return (padded_columns() + 3 * static_cast<int>(rows.size()) + 3) & ~3; }
+  int height() const { return (padded_columns() + 3 * static_cast<int>(rows.size()) + 7) & ~7; }
 };
 
 struct Fronts {
   std::vector<Front> all;                  // in the order of elimination
   std::vector<std::vector<int>> by_depth;  // those of one depth need nothing of each other
-  std::size_t entries = 0, pivots = 0;     // of the factor
+  std::size_t entries = 0;                 // of the factor
   /// For solving side by side: fronts that need nothing of other branches, each in the order of
-  /// elimination, and those above them. No branch of several fronts has more than half of the
-  /// entries.
+  /// elimination, and those above them. No tree of several fronts in a branch has more than half of
+  /// the entries; there are some twenty branches at the most.
   std::vector<std::vector<int>> branches;
   std::vector<int> trunk;
 

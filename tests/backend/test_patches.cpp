@@ -6,16 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <set>
 #include <utility>
 #include <vector>
 
-#include "core/solve/sparse_cholesky.hpp"
-#include "cpu/front_factor.hpp"
-#include "kernels/layout.hpp"
-#include "kernels/noise.hpp"
 #include "tests/support/patch_checks.hpp"
 #include "tests/support/problem.hpp"
 
@@ -341,72 +336,6 @@ TEST(Patches, StayWholeUnderCuts) {
   EXPECT_GT(counts.added, 1000);
   EXPECT_GT(counts.alone, 1000);
   EXPECT_GT(counts.moved, 10);
-}
-
-/// A level with cell matrices of noise, and `diagonal` on their diagonal; zero where held.
-AssembledLevel noisy(const Level& level, double diagonal) {
-  AssembledLevel out(level);
-  std::uint64_t count = 0;
-  out.assemble(level, [&](std::int32_t cell, std::span<double> packed) {
-    const auto held = [&](int i) {
-      const std::int32_t v = level.slots[cell][static_cast<std::size_t>(i / 3)];
-      return ((level.fixed[v] >> (i % 3)) & 1) != 0;
-    };
-    for (int i = 0; i < 24; ++i)
-      for (int j = 0; j <= i; ++j)
-        packed[static_cast<std::size_t>(kernels::packed_index(i, j))] =
-            held(i) || held(j) ? 0
-            : i == j           ? diagonal
-                               : kernels::noise(count++);
-  });
-  return out;
-}
-
-template <class S>
-std::vector<double> solved_by_fronts(const Level& level, const AssembledLevel& matrix, int threads,
-                                     std::vector<double> x) {
-  cpu::FrontFactor<S> factor;
-  factor.analyse(level, matrix);
-  EXPECT_TRUE(factor.factor(matrix, threads));
-  factor.solve(x, threads);
-  return x;
-}
-
-double difference(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0, size = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    sum += (a[i] - b[i]) * (a[i] - b[i]);
-    size += b[i] * b[i];
-  }
-  return std::sqrt(sum / size);
-}
-
-TEST(Fronts, SolveAsASparseFactorDoes) {
-  const Problem p = cut_octree(true);
-  for (const std::size_t l : {1, 2}) {
-    const Level& level = p.hierarchy.levels[l];
-    const AssembledLevel matrix = noisy(level, 20);
-    std::vector<double> right(static_cast<std::size_t>(matrix.unknowns())), expected(right);
-    for (std::size_t i = 0; i < right.size(); ++i)
-      right[i] = (level.fixed[i / 3] >> (i % 3) & 1) != 0 ? 0 : kernels::noise(i);
-    SparseCholesky sparse(CholeskyEngine::simplicial);
-    sparse.analyse(matrix);
-    ASSERT_TRUE(sparse.factor(matrix));
-    sparse.solve(right, expected);
-    const std::vector<double> one = solved_by_fronts<double>(level, matrix, 1, right);
-    EXPECT_LT(difference(one, expected), 1e-12);
-    EXPECT_EQ(one, solved_by_fronts<double>(level, matrix, 3, right));
-    EXPECT_LT(difference(solved_by_fronts<float>(level, matrix, 2, right), expected), 1e-5);
-  }
-}
-
-TEST(Fronts, SayThatAMatrixIsNotDefinite) {
-  const Problem p = cut_octree(true);
-  const Level& level = p.hierarchy.levels[1];
-  const AssembledLevel matrix = noisy(level, 0.1);
-  cpu::FrontFactor<double> factor;
-  factor.analyse(level, matrix);
-  EXPECT_FALSE(factor.factor(matrix, 2));
 }
 
 }  // namespace
