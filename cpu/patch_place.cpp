@@ -33,7 +33,7 @@ void PatchPlacer::place(std::vector<Draft>& drafts, const std::vector<std::int32
     if (draft.moves_cells()) moves.groups.push_back(out_.patches[draft.patch].groups);
   list_copies();
   if (finer_ != nullptr) place_children();
-  if (next_ != nullptr) place_transfers(transfers, *next_, threads_, out_);
+  if (next_ != nullptr) place_transfers(transfers, moves, *next_, threads_, out_);
 }
 
 // --- vertices ------------------------------------------------------------------------------------
@@ -70,6 +70,7 @@ void PatchPlacer::share(std::int32_t v) {
     out_.fixed[from] = 0;
     out_.own_point[from] = kNothing;
     moves_->vertices.push_back({from, to});
+    moves_->touch(from);
   }
   out_.packed[v] = to;
   out_.vertex[to] = v;
@@ -128,6 +129,7 @@ void PatchPlacer::place_own(const Draft& draft) {
     while (out_.vertex[at] >= 0) ++at;
     out_.vertex[at] = v;
     out_.packed[v] = at;
+    moves_->touch(at);
   }
   const std::int32_t end = fresh.empty() ? own.first : at / kGroup * kGroup + kGroup;
   own.size = std::max(own.size, end - own.first);

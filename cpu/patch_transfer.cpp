@@ -35,35 +35,112 @@ void put(const std::vector<T>& from, std::int32_t first, To& to) {
   std::copy(from.begin(), from.end(), to.begin() + first);
 }
 
-void put_blocks(const std::vector<TransferBlock>& from, const TransferPart& part,
-                std::int32_t first, std::vector<TransferBlock>& to) {
-  for (std::size_t n = 0; n < from.size(); ++n) {
-    TransferBlock& block = to[static_cast<std::size_t>(first) + n];
-    block = from[n];
-    block.first_run += part.runs.first;
-    block.first_term += part.terms.first;
+/// place(n): the block of the n-th one, and its first vertex in `others`.
+template <class Place>
+void put_blocks(const BlockDraft& from, std::int32_t run, std::int32_t term, const Place& place,
+                Transfer& t) {
+  put(from.runs, run, t.runs);
+  put(from.term_point, term, t.term_point);
+  put(from.term_weight, term, t.term_weight);
+  std::size_t other = 0;
+  for (std::size_t n = 0; n < from.blocks.size(); ++n) {
+    const auto [block, others] = place(n);
+    *block = from.blocks[n];
+    block->first_run += run;
+    block->first_term += term;
+    const std::size_t count = std::min<std::size_t>(kGroup, from.others.size() - other);
+    std::copy_n(from.others.begin() + size_of(other), count, others);
+    other += count;
   }
 }
 
-void write_part(const TransferDraft& draft, const Patch& patch, const TransferPart& part,
+/// `before`: the part as it was.
+void write_part(const TransferDraft& draft, const TransferPart& part, const TransferPart& before,
                 Transfer& t) {
-  put(draft.points, part.points.first, t.point);
-  put(draft.runs, part.runs.first, t.runs);
-  put(draft.term_point, part.terms.first, t.term_point);
-  put(draft.term_weight, part.terms.first, t.term_weight);
-  put(draft.terms, patch.own.first, t.terms);
+  const bool whole = draft.whole;
+  const std::int32_t kept = whole ? 0 : before.points.size;
+  if (part.points.first != before.points.first)
+    std::copy_n(t.point.begin() + before.points.first, kept, t.point.begin() + part.points.first);
+  put(draft.points, part.points.first + kept, t.point);
+  put_blocks(
+      draft.own, whole ? part.runs.first : part.more_runs.first + before.more_runs.size,
+      whole ? part.terms.first : part.more_terms.first + before.more_terms.size,
+      [&](std::size_t n) {
+        const std::int32_t tile = whole ? part.own.first / kGroup + size_of(n) : draft.tiles[n];
+        return std::pair{&t.tiles[tile], t.others.begin() + kGroup * tile};
+      },
+      t);
   put(draft.lead, part.leads.first, t.lead);
-  put(draft.lead_terms, part.leads.first, t.lead_terms);
-  put_blocks(draft.tiles, part, patch.own.first / kGroup, t.tiles);
-  put_blocks(draft.lead_blocks, part, part.lead_blocks.first, t.lead_blocks);
+  put_blocks(
+      draft.leads, part.lead_runs.first, part.lead_terms.first,
+      [&](std::size_t n) {
+        return std::pair{&t.lead_blocks[static_cast<std::size_t>(part.lead_blocks.first) + n],
+                         t.lead_others.begin() + part.leads.first + kGroup * size_of(n)};
+      },
+      t);
 }
+
+/// What tiles that are made again may take, until all of a part is.
+std::int32_t room_for_terms(const Range& own) { return 2 * own.size; }
+std::int32_t room_for_runs(const Range& own) { return own.size / 4; }
+
+/// Ends of the arrays, where parts find room.
+struct Ends {
+  std::int32_t points, runs, terms, leads, blocks;
+
+  explicit Ends(const Transfer& t)
+      : points(size_of(t.point.size())),
+        runs(size_of(t.runs.size())),
+        terms(size_of(t.term_point.size())),
+        leads(size_of(t.lead.size())),
+        blocks(size_of(t.lead_blocks.size())) {}
+
+  void fit(const TransferDraft& draft, const Range& own, TransferPart& part) {
+    if (draft.whole) {
+      part.own = own;
+      part.points.fit(draft.points.size(), points);
+      part.runs.fit(draft.own.runs.size(), runs);
+      part.terms.fit(draft.own.term_point.size(), terms);
+      part.more_runs.size = part.more_terms.size = 0;
+    } else {
+      part.own.size = own.size;
+      part.points.grow(draft.points.size(), true, points);
+      append(draft.own.runs.size(), room_for_runs(own), part.more_runs, runs);
+      append(draft.own.term_point.size(), room_for_terms(own), part.more_terms, terms);
+    }
+    part.leads.fit(draft.lead.size(), leads);
+    part.lead_runs.fit(draft.leads.runs.size(), runs);
+    part.lead_terms.fit(draft.leads.term_point.size(), terms);
+    part.lead_blocks.fit(draft.leads.blocks.size(), blocks);
+  }
+  void resize(Transfer& t) const {
+    t.point.resize(static_cast<std::size_t>(points));
+    t.runs.resize(static_cast<std::size_t>(runs));
+    t.term_point.resize(static_cast<std::size_t>(terms));
+    t.term_weight.resize(t.term_point.size());
+    t.lead.resize(static_cast<std::size_t>(leads));
+    t.lead_others.resize(static_cast<std::size_t>(leads));
+    t.lead_blocks.resize(static_cast<std::size_t>(blocks));
+  }
+
+ private:
+  /// All the room at once; what there is of it is enough.
+  static void append(std::size_t count, std::int32_t room, Range& range, std::int32_t& end) {
+    if (range.room == 0) {
+      range = {end, 0, room};
+      end += room;
+    }
+    range.size += size_of(count);
+    ensures(range.size <= range.room, "tiles that are made again have no room");
+  }
+};
 
 }  // namespace
 
 std::size_t Transfer::bytes() const {
   const auto of = [](const auto& array) { return array.capacity() * sizeof(array[0]); };
   return of(parts) + of(point) + of(tiles) + of(lead_blocks) + of(runs) + of(term_point) +
-         of(term_weight) + of(terms) + of(lead) + of(lead_terms) + of(giver_begin) + of(givers) +
+         of(term_weight) + of(others) + of(lead) + of(lead_others) + of(giver_begin) + of(givers) +
          of(giver_rows.count);
 }
 
@@ -75,8 +152,9 @@ FirstCells::FirstCells(const Level& level) : level_(level) {
       if (std::int32_t& first = first_[level.slots[c][i]]; first < 0) first = 8 * c + size_of(i);
 }
 
-TransferRows::TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first)
-    : level_(level), next_(next), first_(first), local_(next.point.size()) {
+TransferRows::TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first,
+                           const PatchMoves& moves)
+    : level_(level), next_(next), first_(first), moves_(moves), local_(next.point.size()) {
   for (int place = 0; place <= kernels::kPassed; ++place)
     regular_[static_cast<std::size_t>(place)] =
         terms_of(kernels::FoldCode{0}, place, kernels::FoldCode{0});
@@ -122,7 +200,7 @@ void TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
     std::int32_t& point = local_[taken];
     if (point == 0) {
       out.points.push_back(taken);
-      point = size_of(out.points.size());
+      point = points_before_ + size_of(out.points.size());
     }
     points[k] = static_cast<std::uint16_t>(point - 1);
     weights[k] = row.weight[k];
@@ -133,7 +211,6 @@ void TransferRows::add_row(std::int32_t vertex, TransferDraft& out) {
 /// Points from the order in which they were met to that of their places, so that they follow each
 /// other along x; those of a patch that spans more than 16 bits count stay as they are.
 void TransferRows::sort_points(TransferDraft& out) {
-  for (const std::int32_t v : out.points) local_[v] = 0;
   if (out.points.empty()) return;
   Vec3i low = next_.point[out.points[0]], high = low;
   for (const std::int32_t v : out.points)
@@ -205,13 +282,21 @@ TransferRun TransferRows::longest_run(std::size_t first, std::size_t end) const 
   return best;
 }
 
+/// Of a vertex in no run; the last one has weights.
+int TransferRows::class_of(const Row& row) const {
+  const auto unit = static_cast<int>(kUnit);
+  for (int n = 0; n < TransferBlock::kMeans; ++n)
+    if (row.count == 1 << n && row.has_weights(unit >> n)) return n;
+  return TransferBlock::kMeans;
+}
+
 /// Some vertices: runs of them, and the terms of the others.
-TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, TransferDraft& out,
-                                      std::vector<std::uint8_t>& terms) {
+void TransferRows::add_block(std::size_t first, std::size_t count, BlockDraft& out) {
   constexpr std::size_t kShortest = 8;  // of fewer, terms are as fast
   TransferBlock block;
   block.first_run = size_of(out.runs.size());
   block.first_term = size_of(out.term_point.size());
+  for (auto& rows : classes_) rows.clear();
   const std::size_t end = first + count;
   for (std::size_t n = first; n < end;) {
     TransferRun run;
@@ -219,106 +304,178 @@ TransferBlock TransferRows::add_block(std::size_t first, std::size_t count, Tran
     if (run.size >= kShortest) {
       run.first = static_cast<std::uint8_t>(n - first);
       out.runs.push_back(run);
-      terms.insert(terms.end(), run.size, std::uint8_t{0});
       ++block.runs;
       n += run.size;
       continue;
     }
     // What ends a run soon ends those soon that start within it.
-    for (const std::size_t stop = n + std::max<std::size_t>(run.size, 1); n < stop; ++n) {
+    for (const std::size_t stop = n + std::max<std::size_t>(run.size, 1); n < stop; ++n)
+      if (row(n).count > 0)
+        classes_[static_cast<std::size_t>(class_of(row(n)))].push_back(n);
+      else
+        block.gaps = true;
+  }
+  const std::size_t whole = out.others.size() + count;
+  for (std::size_t k = 0; k < classes_.size(); ++k) {
+    (k < TransferBlock::kMeans ? block.means[k] : block.weighted) =
+        static_cast<std::uint8_t>(classes_[k].size());
+    for (const std::size_t n : classes_[k]) {
       const Row one = row(n);
-      const auto unit = static_cast<int>(kUnit);
-      const bool alike =
-          one.count > 0 && unit % one.count == 0 && one.has_weights(unit / one.count);
-      terms.push_back(static_cast<std::uint8_t>(one.count + (alike ? Transfer::kMean : 0)));
+      out.others.push_back(TransferVertex::of(size_of(n - first), one.count));
       out.term_point.insert(out.term_point.end(), one.point, one.point + one.count);
       out.term_weight.insert(out.term_weight.end(), one.weight, one.weight + one.count);
-      (one.count > 0 ? block.others : block.gaps) = true;
     }
   }
-  return block;
+  out.others.resize(whole);
+  out.blocks.push_back(block);
 }
 
-TransferDraft TransferRows::operator()(std::int32_t n) {
+void TransferRows::start_rows(std::int32_t n) {
   const Patch& patch = level_.patches[n];
-  TransferDraft out;
   const auto most = 8 * static_cast<std::size_t>(patch.own.size + patch.copies.size);
   if (points_.size() < most) points_.resize(most), weights_.resize(most);
   row_begin_.assign(1, 0);
-  for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v)
-    if (level_.vertex[v] >= 0)
-      add_row(level_.vertex[v], out);
+}
+
+/// The rows of a tile.
+void TransferRows::add_tile(std::int32_t tile, TransferDraft& out) {
+  for (std::int32_t at = kGroup * tile; at < kGroup * (tile + 1); ++at)
+    if (level_.vertex[at] >= 0)
+      add_row(level_.vertex[at], out);
     else
       row_begin_.push_back(row_begin_.back());
-  for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
+}
+
+/// The leads of a patch, and their rows.
+void TransferRows::add_leads(std::int32_t n, TransferDraft& out) {
+  const Range& copies = level_.patches[n].copies;
+  for (std::int32_t k = copies.first; k < copies.end(); ++k) {
     const std::int32_t v = level_.vertex[level_.copy_vertex[k]];
     if (level_.patch_of_cell(first_[v] / 8) != n) continue;
     out.lead.push_back(level_.copy_vertex[k]);
     add_row(v, out);
   }
-  constexpr std::size_t kMost = 0x10000;
-  ensures(out.points.size() <= kMost, "a patch has too many vertices for its transfers");
+}
+
+/// Their blocks, from the row of the first one on.
+void TransferRows::add_lead_blocks(std::size_t first, TransferDraft& out) {
+  const std::size_t all = first + out.lead.size();
+  for (; first < all; first += kGroup)
+    add_block(first, std::min<std::size_t>(kGroup, all - first), out.leads);
+}
+
+constexpr std::size_t kMostPoints = 0x10000;  // of a part
+
+TransferDraft TransferRows::make(std::int32_t n) {
+  const Range& own = level_.patches[n].own;
+  TransferDraft out;
+  start_rows(n);
+  points_before_ = 0;
+  for (std::int32_t tile = own.first / kGroup; tile < own.end() / kGroup; ++tile)
+    add_tile(tile, out);
+  const auto rows = static_cast<std::size_t>(own.size);
+  add_leads(n, out);
+  for (const std::int32_t v : out.points) local_[v] = 0;
+  ensures(out.points.size() <= kMostPoints, "a patch has too many vertices for its transfers");
   sort_points(out);
-  const auto own = static_cast<std::size_t>(patch.own.size), all = own + out.lead.size();
-  out.terms.reserve(own);
-  out.tiles.reserve(own / kGroup);
-  out.runs.reserve(all / 8);
-  out.term_point.reserve(all);
-  out.term_weight.reserve(all);
-  for (std::size_t first = 0; first < own; first += kGroup)
-    out.tiles.push_back(add_block(first, kGroup, out, out.terms));
-  for (std::size_t first = own; first < all; first += kGroup)
-    out.lead_blocks.push_back(
-        add_block(first, std::min<std::size_t>(kGroup, all - first), out, out.lead_terms));
+  out.own.others.reserve(rows);
+  out.own.blocks.reserve(rows / kGroup);
+  out.own.runs.reserve(rows / 8);
+  out.own.term_point.reserve(rows);
+  out.own.term_weight.reserve(rows);
+  for (std::size_t first = 0; first < rows; first += kGroup) add_block(first, kGroup, out.own);
+  add_lead_blocks(rows, out);
   return out;
 }
 
-void place_transfers(const std::vector<std::int32_t>& patches, const Level& next, int threads,
-                     PatchedLevel& level) {
+/// Tiles with other vertices or other rows, and those that the patch has not had.
+std::vector<std::int32_t> TransferRows::tiles_to_make(const Patch& patch,
+                                                      const TransferPart& part) const {
+  std::vector<std::int32_t> out;
+  for (std::int32_t tile = patch.own.first / kGroup; tile < patch.own.end() / kGroup; ++tile) {
+    const bool touched =
+        static_cast<std::size_t>(tile) < moves_.tiles.size() && moves_.tiles[tile] != 0;
+    if (touched || kGroup * tile >= part.own.end()) out.push_back(tile);
+  }
+  return out;
+}
+
+/// False where all has to be made.
+bool TransferRows::make_some(std::int32_t n, TransferDraft& out) {
+  if (static_cast<std::size_t>(n) >= level_.transfer.parts.size()) return false;
+  const TransferPart& part = level_.transfer.parts[n];
+  const Patch& patch = level_.patches[n];
+  if (part.own.size == 0 || part.own.first != patch.own.first || part.own.size > patch.own.size)
+    return false;
+  out.whole = false;
+  out.tiles = tiles_to_make(patch, part);
+  if (4 * kGroup * size_of(out.tiles.size()) > 3 * patch.own.size) return false;
+  start_rows(n);
+  points_before_ = part.points.size;
+  for (std::int32_t k = 0; k < part.points.size; ++k)
+    local_[level_.transfer.point[part.points.first + k]] = k + 1;
+  for (const std::int32_t tile : out.tiles) add_tile(tile, out);
+  add_leads(n, out);
+  for (std::int32_t k = 0; k < part.points.size; ++k)
+    local_[level_.transfer.point[part.points.first + k]] = 0;
+  for (const std::int32_t v : out.points) local_[v] = 0;
+  if (static_cast<std::size_t>(part.points.size) + out.points.size() > kMostPoints) return false;
+  const std::size_t rows = kGroup * out.tiles.size();
+  for (std::size_t first = 0; first < rows; first += kGroup) add_block(first, kGroup, out.own);
+  add_lead_blocks(rows, out);
+  const auto fits = [](const Range& range, std::size_t count, std::int32_t room) {
+    return range.size + size_of(count) <= (range.room > 0 ? range.room : room);
+  };
+  return fits(part.more_runs, out.own.runs.size(), room_for_runs(patch.own)) &&
+         fits(part.more_terms, out.own.term_point.size(), room_for_terms(patch.own));
+}
+
+TransferDraft TransferRows::operator()(std::int32_t patch) {
+  if (TransferDraft some; make_some(patch, some)) return some;
+  return make(patch);
+}
+
+void place_transfers(const std::vector<std::int32_t>& patches, const PatchMoves& moves,
+                     const Level& next, int threads, PatchedLevel& level) {
   Transfer& t = level.transfer;
   const bool anew = t.parts.empty();
   const auto count = size_of(patches.size());
   const FirstCells first(*level.level);
   std::vector<TransferDraft> drafts(patches.size());
   for_patches(
-      0, count, threads, [&] { return std::make_unique<TransferRows>(level, next, first); },
+      0, count, threads, [&] { return std::make_unique<TransferRows>(level, next, first, moves); },
       [&](std::int32_t i, TransferRows& rows) { drafts[i] = rows(patches[i]); });
   t.parts.resize(level.patches.size());
+  std::vector<TransferPart> before;
+  for (const std::int32_t p : patches) before.push_back(t.parts[p]);
+  Ends ends(t);
+  for (std::size_t i = 0; i < drafts.size(); ++i)
+    ends.fit(drafts[i], level.patches[patches[i]].own, t.parts[patches[i]]);
+  // Points that stay where they are stay on the lists.
+  const auto points_kept = [&](std::size_t i) {
+    const bool stay =
+        !drafts[i].whole && t.parts[patches[i]].points.first == before[i].points.first;
+    return stay ? before[i].points.size : 0;
+  };
   if (!anew) {
     Rows givers(t.giver_begin, t.givers, t.giver_rows);
-    for (const std::int32_t p : patches)
-      for (std::int32_t k = t.parts[p].points.first; k < t.parts[p].points.end(); ++k)
-        givers.remove(t.point[k], k);
+    for (std::size_t i = 0; i < drafts.size(); ++i)
+      for (std::int32_t k = points_kept(i); k < before[i].points.size; ++k)
+        givers.remove(t.point[before[i].points.first + k], before[i].points.first + k);
     while (size_of(t.giver_begin.size()) - 1 < next.vertices()) givers.append({});
   }
-  std::int32_t points = size_of(t.point.size()), runs = size_of(t.runs.size()),
-               terms = size_of(t.term_point.size()), leads = size_of(t.lead.size()),
-               blocks = size_of(t.lead_blocks.size());
-  for (std::size_t i = 0; i < drafts.size(); ++i) {
-    TransferPart& part = t.parts[patches[i]];
-    part.points.fit(drafts[i].points.size(), points);
-    part.runs.fit(drafts[i].runs.size(), runs);
-    part.terms.fit(drafts[i].term_point.size(), terms);
-    part.leads.fit(drafts[i].lead.size(), leads);
-    part.lead_blocks.fit(drafts[i].lead_blocks.size(), blocks);
-  }
-  t.point.resize(static_cast<std::size_t>(points));
-  t.runs.resize(static_cast<std::size_t>(runs));
-  t.term_point.resize(static_cast<std::size_t>(terms));
-  t.term_weight.resize(t.term_point.size());
-  t.lead.resize(static_cast<std::size_t>(leads));
-  t.lead_terms.resize(static_cast<std::size_t>(leads));
-  t.lead_blocks.resize(static_cast<std::size_t>(blocks));
-  t.terms.resize(level.vertices());
+  ends.resize(t);
+  t.others.resize(level.vertices());
   t.tiles.resize(level.tiles());
 #pragma omp parallel for num_threads(threads) schedule(static) if (count > 1)
-  for (std::int32_t i = 0; i < count; ++i)
-    write_part(drafts[i], level.patches[patches[i]], t.parts[patches[i]], t);
+  for (std::int32_t i = 0; i < count; ++i) write_part(drafts[i], t.parts[patches[i]], before[i], t);
   if (anew) return list_givers(next.point.size(), t);
   Rows givers(t.giver_begin, t.givers, t.giver_rows);
-  for (const std::int32_t p : patches)
-    for (std::int32_t k = t.parts[p].points.first; k < t.parts[p].points.end(); ++k)
-      givers.insert(t.point[k], k);
+  for (std::size_t i = 0; i < drafts.size(); ++i) {
+    const Range& points = t.parts[patches[i]].points;
+    for (std::int32_t k = points_kept(i); k < points.size; ++k)
+      givers.insert(t.point[points.first + k], points.first + k);
+  }
   givers.pack_if_wasteful();
 }
 

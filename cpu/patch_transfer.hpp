@@ -12,16 +12,22 @@
 
 namespace kerf::cpu {
 
-/// A part before it has a place in the arrays. Runs and terms of blocks are counted from its own.
-struct TransferDraft {
-  std::vector<std::int32_t> points;  // vertices of the next level
-  std::vector<TransferBlock> tiles, lead_blocks;
+/// Runs and terms of some blocks, counted from their own.
+struct BlockDraft {
+  std::vector<TransferBlock> blocks;
   std::vector<TransferRun> runs;
   std::vector<std::uint16_t> term_point;
   std::vector<std::uint8_t> term_weight;
-  std::vector<std::uint8_t> terms;  // per own vertex
+  std::vector<TransferVertex> others;  // as many as vertices
+};
+
+/// A part before it has a place in the arrays: all of it, or where it stays what is made again.
+struct TransferDraft {
+  bool whole = true;
+  std::vector<std::int32_t> points;  // vertices of the next level, behind those that it has
+  std::vector<std::int32_t> tiles;   // where not all are made
   std::vector<std::int32_t> lead;
-  std::vector<std::uint8_t> lead_terms;
+  BlockDraft own, leads;
 };
 
 /// Of each vertex of a level its first cell, as in Level::incidences_of, which may be gone.
@@ -39,10 +45,12 @@ class FirstCells {
 };
 
 /// The parts of one patch after the other. What a vertex takes is its row: that of its first cell;
-/// those of its other cells agree.
+/// those of its other cells agree. Of a part that is there, only the tiles of `moves` are made
+/// again, as long as there is room for them; and all leads.
 class TransferRows {
  public:
-  TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first);
+  TransferRows(const PatchedLevel& level, const Level& next, const FirstCells& first,
+               const PatchMoves& moves);
   TransferDraft operator()(std::int32_t patch);
 
  private:
@@ -63,10 +71,17 @@ class TransferRows {
 
   static SlotTerms terms_of(std::uint16_t child, int place, std::uint16_t parent);
   const SlotTerms& terms(std::uint16_t child, int place, std::uint16_t parent);
+  TransferDraft make(std::int32_t patch);
+  bool make_some(std::int32_t patch, TransferDraft& out);
+  std::vector<std::int32_t> tiles_to_make(const Patch& patch, const TransferPart& part) const;
+  void start_rows(std::int32_t patch);
   void add_row(std::int32_t vertex, TransferDraft& out);
+  void add_tile(std::int32_t tile, TransferDraft& out);
+  void add_leads(std::int32_t patch, TransferDraft& out);
   void sort_points(TransferDraft& out);
-  TransferBlock add_block(std::size_t first, std::size_t count, TransferDraft& out,
-                          std::vector<std::uint8_t>& terms);
+  void add_lead_blocks(std::size_t first, TransferDraft& out);
+  void add_block(std::size_t first, std::size_t count, BlockDraft& out);
+  int class_of(const Row& row) const;
   TransferRun longest_run(std::size_t row, std::size_t end) const;
   TransferRun run_of_kind(std::size_t row, std::size_t end, int rows, bool between) const;
   Row row(std::size_t n) const {
@@ -78,7 +93,9 @@ class TransferRows {
   const PatchedLevel& level_;
   const Level& next_;
   const FirstCells& first_;
-  Marks local_;  // per vertex of the next level: its point, from 1
+  const PatchMoves& moves_;
+  std::int32_t points_before_ = 0;  // of the part
+  Marks local_;                     // per vertex of the next level: its point, from 1
   // Rows of all vertices of a patch, its own ones first, and room for more.
   std::vector<std::uint16_t> points_;
   std::vector<std::uint8_t> weights_;
@@ -86,12 +103,13 @@ class TransferRows {
   std::vector<std::int32_t> met_;     // points as they were met
   std::vector<std::uint64_t> order_;  // of them: place, then number
   std::vector<std::uint16_t> rank_;
+  std::array<std::vector<std::size_t>, TransferBlock::kMeans + 1> classes_;  // rows of a block
   std::array<SlotTerms, 9> regular_;
   std::unordered_map<std::uint64_t, SlotTerms> others_;
 };
 
 /// Makes the parts of some patches, in ascending order, and all that they need.
-void place_transfers(const std::vector<std::int32_t>& patches, const Level& next, int threads,
-                     PatchedLevel& level);
+void place_transfers(const std::vector<std::int32_t>& patches, const PatchMoves& moves,
+                     const Level& next, int threads, PatchedLevel& level);
 
 }  // namespace kerf::cpu

@@ -145,9 +145,11 @@ class Patcher {
     if (last_kind_ >= kinds.size() || !(kinds[last_kind_] == kind))
       last_kind_ =
           static_cast<std::size_t>(std::find(kinds.begin(), kinds.end(), kind) - kinds.begin());
-    if (last_kind_ == kinds.size()) kinds.push_back(kind);
-    expects(last_kind_ < kMostKinds,
-            text("the body has more than ", kMostKinds, " kinds of cells"));
+    if (last_kind_ == kinds.size()) {
+      expects(last_kind_ < kMostKinds,
+              text("the body has more than ", kMostKinds, " kinds of cells"));
+      kinds.push_back(kind);
+    }
     return static_cast<std::uint16_t>(last_kind_);
   }
 
@@ -155,7 +157,7 @@ class Patcher {
     if (out_.held[c] == kWhollyHeld) return kIdle;
     const auto children = level_.children_of(c);
     const bool passed = finer_->level->place[children[0]] == Level::kPassed;
-    unsigned octants = 0;  // without duplication two children can have one
+    unsigned octants = 0;  // behind the end of a cut two children can have one
     bool twice = false;
     for (const std::int32_t child : children) {
       const unsigned bit = 1U << (finer_->level->place[child] % 8);
@@ -211,8 +213,17 @@ class Patcher {
     for (std::size_t i = 0; i < above->cells.size(); ++i) {  // rows of the transfer
       const std::int32_t parent = above->cells[i];
       if (i < above->before.size() && is_same(*next_, parent, above->before[i])) continue;
-      for (const std::int32_t c : next_->children_of(parent)) works_[patch_of(c)].transfers = true;
+      for (const std::int32_t c : next_->children_of(parent)) touch_transfers(c);
     }
+  }
+
+  /// The vertices of a cell may take other values.
+  void touch_transfers(std::int32_t c) {
+    works_[patch_of(c)].transfers = true;
+    for (const std::int32_t v : level_.slots[c]) touch_tile(v);
+  }
+  void touch_tile(std::int32_t v) {
+    if (out_.packed[v] >= 0) moves_.touch(out_.packed[v]);  // else it gets a place
   }
 
   /// The row of a vertex is that of its first cell, which may be another now.
@@ -220,6 +231,7 @@ class Patcher {
     const bool is_new = v >= change_->vertices_before;
     const bool held_otherwise = !is_new && out_.fixed[out_.packed[v]] != level_.fixed[v];
     const bool may_be_loose = finer_ != nullptr && finer_->children.empty();
+    touch_tile(v);
     for (const std::int32_t item : level_.incidences_of(v)) {
       works_[patch_of(item / 8)].transfers = true;
       if (held_otherwise || may_be_loose) also.push_back(item / 8);
@@ -233,6 +245,7 @@ class Patcher {
     out_.held[c] = held;
     Work& work = works_[patch_of(c)];
     work.transfers = true;
+    if (is_new || is_other) touch_transfers(c);
     if (is_new) {
       work.arrived.push_back(c);
     } else if (kind_of(c) != out_.kind[out_.lane[c] / kGroup]) {

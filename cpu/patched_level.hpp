@@ -134,10 +134,12 @@ struct Patch {
 /// leads, which are shared vertices. What a shared vertex takes is in one patch: that of its first
 /// cell.
 struct TransferPart {
-  Range points;
+  Range points;  // after cuts some that no vertex takes
   Range runs, terms;
-  Range leads;
+  Range more_runs, more_terms;  // of tiles that were made again since
+  Range leads, lead_runs, lead_terms;
   Range lead_blocks;  // of kGroup leads, but for the last
+  Range own;          // of the patch, as its tiles were made
 };
 
 /// Vertices of a block side by side along x that take from points side by side along x: from one
@@ -154,19 +156,33 @@ struct TransferRun {
   friend bool operator==(const TransferRun&, const TransferRun&) = default;
 };
 
+/// Its vertices in no run that have terms come in classes, so that what reads them need not ask
+/// each: means of 1, 2, 4 and 8 points, and those with weights.
 struct TransferBlock {
+  static constexpr int kMeans = 4;
+
   std::int32_t first_run = 0, first_term = 0;
   std::uint8_t runs = 0;
-  bool others = false;  // some vertex is in no run, but has terms
-  bool gaps = false;    // some place has no vertex
+  std::uint8_t means[kMeans] = {}, weighted = 0;  // vertices of each class
+  bool gaps = false;                              // some place has no vertex
 
   friend bool operator==(const TransferBlock&, const TransferBlock&) = default;
 };
 
+/// A vertex in no run: its place in the block, and how many terms it has.
+struct TransferVertex {
+  std::uint8_t code = 0;
+
+  static TransferVertex of(int place, int terms) {
+    return {static_cast<std::uint8_t>(place | (terms - 1) << 4)};
+  }
+  int place() const { return code & 15; }
+  int terms() const { return (code >> 4) + 1; }
+  friend bool operator==(const TransferVertex&, const TransferVertex&) = default;
+};
+
 /// Between the vertices of a level and of the next.
 struct Transfer {
-  static constexpr std::uint8_t kMean = 16;  // more than the terms of any vertex
-
   std::vector<TransferPart> parts;   // per patch
   std::vector<std::int32_t> point;   // the vertex of the next level, in its own numbers
   std::vector<TransferBlock> tiles;  // of own vertices
@@ -174,9 +190,10 @@ struct Transfer {
   Array<TransferRun> runs;
   Array<std::uint16_t> term_point;  // within the part
   Array<std::uint8_t> term_weight;  // 64ths: exact
-  std::vector<std::uint8_t> terms;  // per packed vertex: how many, 0 in runs; kMean: all alike
-  std::vector<std::int32_t> lead;   // packed
-  std::vector<std::uint8_t> lead_terms;
+  // Those of a tile from its first vertex on, in classes, with their terms in that order; and
+  // those of a block of leads from its first lead on.
+  std::vector<TransferVertex> others, lead_others;
+  std::vector<std::int32_t> lead;                 // packed
   std::vector<std::int32_t> giver_begin, givers;  // per vertex of the next level: its points
   RowState giver_rows;
 
@@ -275,6 +292,13 @@ struct PatchMoves {
   std::vector<Move> cells;         ///< lane (of a new cell: that of its origin), and the cell
   std::vector<Range> groups;       ///< whose lanes are others now
   std::vector<std::int32_t> held;  ///< cells that are new or have another HeldCell
+  std::vector<char> tiles;         ///< whether vertices of a tile are others, or take other values
+
+  void touch(std::int32_t packed) {
+    const auto tile = static_cast<std::size_t>(packed / kGroup);
+    if (tile >= tiles.size()) tiles.resize(tile + 1);
+    tiles[tile] = 1;
+  }
 };
 
 /// Brings the patches up to date after a cut: numbers stay where nothing changed, and what is new

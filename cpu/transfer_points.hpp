@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "cpu/patch_sweep.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::cpu {
 
@@ -46,14 +47,14 @@ class TransferPoints {
 
   /// What the loaded points give to own vertices. Of a tile, the first lanes are asked for first.
   kernels::Vec3<Pack<S>> taken(std::size_t tile, int first) {
-    if (first == 0) take(transfer_.tiles[tile], transfer_.terms.data() + kGroup * tile, kGroup);
+    if (first == 0) take(transfer_.tiles[tile], transfer_.others.data() + kGroup * tile);
     return gathered(static_cast<const S*>(rows_ + 4 * first));
   }
 
   /// Adds it to the shared vertices of the part, where they are not held.
   void add_to_leads(S* u) {
     for_lead_blocks([&](const TransferBlock& block, std::int32_t first, int count) {
-      take(block, transfer_.lead_terms.data() + first, count);
+      take(block, transfer_.lead_others.data() + first);
       for (int k = 0; k < count; ++k) {
         const std::int32_t v = transfer_.lead[first + k];
         S* to = u + scalar_of(v);
@@ -76,7 +77,7 @@ class TransferPoints {
       __builtin_memcpy(rows_ + 4 * (first + lane), &record, sizeof record);
     });
     if (first + Pack<S>::kLanes == kGroup)
-      give(transfer_.tiles[tile], transfer_.terms.data() + kGroup * tile, kGroup, given_to(out));
+      give(transfer_.tiles[tile], transfer_.others.data() + kGroup * tile, given_to(out));
   }
   void give_own(const S* r, S* out) {
     for (std::int32_t t = own_.first / kGroup; t < own_.end() / kGroup; ++t) {
@@ -91,7 +92,7 @@ class TransferPoints {
         const S* from = r + scalar_of(transfer_.lead[first + k]);
         row[0] = from[0], row[1] = from[kGroup], row[2] = from[2 * kGroup], row[3] = 0;
       }
-      give(block, transfer_.lead_terms.data() + first, count, given_to(out));
+      give(block, transfer_.lead_others.data() + first, given_to(out));
     });
   }
 
@@ -136,15 +137,15 @@ class TransferPoints {
   }
 
   // Functions of their own where sweeps call them: see above.
-  [[gnu::noinline]] void take(const TransferBlock& block, const std::uint8_t* terms, int count) {
+  [[gnu::noinline]] void take(const TransferBlock& block, const TransferVertex* others) {
     if (block.gaps) std::fill(std::begin(rows_), std::end(rows_), S(0));
     for_runs(block, [&](auto rows, const TransferRun& run) { take_run<rows()>(run); });
-    if (block.others) take_others(block, terms, count);
+    take_others(block, others);
   }
-  [[gnu::noinline]] void give(const TransferBlock& block, const std::uint8_t* terms, int count,
+  [[gnu::noinline]] void give(const TransferBlock& block, const TransferVertex* others,
                               S* to) const {
     for_runs(block, [&](auto rows, const TransferRun& run) { give_run<rows()>(run, to); });
-    if (block.others) give_others(block, terms, count, to);
+    give_others(block, others, to);
   }
 
   /// The mean of the k-th points of the rows.
@@ -186,26 +187,6 @@ class TransferPoints {
       }
     }
   }
-  /// body(count as a type), if all terms of a vertex are alike and as many as in a grid.
-  template <class Body>
-  static bool for_mean(std::uint8_t terms, const Body& body) {
-    switch (terms) {
-      case Transfer::kMean + 1:
-        body(std::integral_constant<int, 1>{});
-        return true;
-      case Transfer::kMean + 2:
-        body(std::integral_constant<int, 2>{});
-        return true;
-      case Transfer::kMean + 4:
-        body(std::integral_constant<int, 4>{});
-        return true;
-      case Transfer::kMean + 8:
-        body(std::integral_constant<int, 8>{});
-        return true;
-      default:
-        return false;
-    }
-  }
   /// The mean of some points, in pairs.
   template <int n>
   void mean_of(const std::uint16_t* point, R& out) const {
@@ -215,23 +196,42 @@ class TransferPoints {
       for (int i = 0; i < half; ++i) of[i] += of[i + half];
     out = S(1) / S(n) * of[0];
   }
-  void take_others(const TransferBlock& block, const std::uint8_t* terms, int count) {
-    const auto first = static_cast<std::size_t>(block.first_term);
-    const std::uint16_t* point = transfer_.term_point.data() + first;
-    const std::uint8_t* weight = transfer_.term_weight.data() + first;
-    for (int k = 0; k < count; ++k) {
-      if (terms[k] == 0) continue;
-      R sum{}, one;
-      const int size = terms[k] % Transfer::kMean;
-      if (!for_mean(terms[k], [&](auto n) { mean_of<n()>(point, sum); }))
-        for (int n = 0; n < size; ++n) {
-          read(x_, point[n], one);
-          sum += weights_[weight[n]] * one;
-        }
-      write(rows_, static_cast<std::size_t>(k), sum);
-      point += size;
-      weight += size;
+  /// mean(terms as a type, place, points) of the vertices that are means, then weighted(terms,
+  /// place, points, weights).
+  template <class Mean, class Weighted>
+  void for_others(const TransferBlock& block, const TransferVertex* other, const Mean& mean,
+                  const Weighted& weighted) const {
+    const std::uint16_t* point = transfer_.term_point.data() + block.first_term;
+    kernels::unrolled<TransferBlock::kMeans>([&](auto n) {
+      constexpr int terms = 1 << decltype(n)::value;
+      for (int k = block.means[n]; k > 0; --k, ++other, point += terms)
+        mean(kernels::Constant<terms>{}, static_cast<std::size_t>(other->place()), point);
+    });
+    const std::uint8_t* weight =
+        transfer_.term_weight.data() + (point - transfer_.term_point.data());
+    for (int k = block.weighted; k > 0; --k, ++other) {
+      const int terms = other->terms();
+      weighted(terms, static_cast<std::size_t>(other->place()), point, weight);
+      point += terms;
+      weight += terms;
     }
+  }
+  void take_others(const TransferBlock& block, const TransferVertex* others) {
+    for_others(
+        block, others,
+        [&](auto terms, std::size_t place, const std::uint16_t* point) {
+          R sum;
+          mean_of<decltype(terms)::value>(point, sum);
+          write(rows_, place, sum);
+        },
+        [&](int terms, std::size_t place, const std::uint16_t* point, const std::uint8_t* weight) {
+          R sum{}, one;
+          for (int n = 0; n < terms; ++n) {
+            read(x_, point[n], one);
+            sum += weights_[weight[n]] * one;
+          }
+          write(rows_, place, sum);
+        });
   }
 
   /// The sum of what vertices give to the k-th points of the rows goes to each of them.
@@ -264,24 +264,20 @@ class TransferPoints {
       put(k, at);
     }
   }
-  void give_others(const TransferBlock& block, const std::uint8_t* terms, int count, S* to) const {
-    const auto first = static_cast<std::size_t>(block.first_term);
-    const std::uint16_t* point = transfer_.term_point.data() + first;
-    const std::uint8_t* weight = transfer_.term_weight.data() + first;
-    for (int k = 0; k < count; ++k) {
-      if (terms[k] == 0) continue;
-      R from;
-      read(rows_, static_cast<std::size_t>(k), from);
-      const int size = terms[k] % Transfer::kMean;
-      const bool done = for_mean(terms[k], [&](auto n) {
-        const R share = S(1) / S(n()) * from;
-        for (int i = 0; i < n(); ++i) add(to, point[i], share);
-      });
-      if (!done)
-        for (int n = 0; n < size; ++n) add(to, point[n], weights_[weight[n]] * from);
-      point += size;
-      weight += size;
-    }
+  void give_others(const TransferBlock& block, const TransferVertex* others, S* to) const {
+    for_others(
+        block, others,
+        [&](auto terms, std::size_t place, const std::uint16_t* point) {
+          R share;
+          read(rows_, place, share);
+          share *= S(1) / S(terms);
+          for (int n = 0; n < terms; ++n) add(to, point[n], share);
+        },
+        [&](int terms, std::size_t place, const std::uint16_t* point, const std::uint8_t* weight) {
+          R from;
+          read(rows_, place, from);
+          for (int n = 0; n < terms; ++n) add(to, point[n], weights_[weight[n]] * from);
+        });
   }
 
   /// Weights by their code.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <set>
 #include <utility>
@@ -80,6 +81,23 @@ TEST(Patches, HaveRunsOfAllKinds) {
   EXPECT_GE(shared.size(), 4u);
   count({LinkedOctree(test::box_body({64, 48, 40}), 2), options});
   EXPECT_TRUE(own.contains({cpu::TransferRun::kIdentity, 0}));
+}
+
+// No balanced octree has vertices with weights: they would lie on a coarse cell with hanging
+// corners that has children beside the larger cell.
+TEST(Patches, HaveMeansOfAllClasses) {
+  std::array<int, cpu::TransferBlock::kMeans> own{}, shared{};
+  const auto add = [](const std::vector<cpu::TransferBlock>& blocks, auto& to) {
+    for (const cpu::TransferBlock& block : blocks)
+      for (std::size_t n = 0; n < to.size(); ++n) to[n] += block.means[n];
+  };
+  const Problem p = cut_octree(true);
+  for (const PatchedLevel& l : patches_of(p.hierarchy, 1)) {
+    add(l.transfer.tiles, own);
+    add(l.transfer.lead_blocks, shared);
+  }
+  for (const auto& classes : {own, shared})
+    for (const int vertices : classes) EXPECT_GT(vertices, 20);
 }
 
 TEST(Patches, HaveLongRowsOfPointsAtLinesOfMemory) {
@@ -170,6 +188,8 @@ void expect_same(const PatchedLevel& a, const PatchedLevel& b) {
   EXPECT_EQ(a.transfer.term_weight, b.transfer.term_weight);
   EXPECT_EQ(a.transfer.runs, b.transfer.runs);
   EXPECT_EQ(a.transfer.tiles, b.transfer.tiles);
+  EXPECT_EQ(a.transfer.others, b.transfer.others);
+  EXPECT_EQ(a.transfer.lead_others, b.transfer.lead_others);
   EXPECT_EQ(a.transfer.lead_blocks, b.transfer.lead_blocks);
   EXPECT_EQ(a.transfer.givers, b.transfer.givers);
 }
@@ -248,11 +268,12 @@ class Followed {
 
 struct Counts {
   int updates = 0, remade = 0, untouched = 0, divided = 0, changed = 0, added = 0;
-  int alone = 0, moved = 0;
+  int alone = 0, moved = 0, tiles = 0, whole = 0;
 
   /// Cells that stayed where they were, with other vertices or as they were; and new ones in
   /// patches most of whose cells stayed. New vertices of one patch among the shared ones, for lack
-  /// of room; and patches whose own vertices moved.
+  /// of room; and patches whose own vertices moved. Patches of which some tiles take other values
+  /// and only those were made again; and those where after this all were.
   void count(const PatchedLevel& before, const PatchedLevel& now, const LevelChange& change) {
     std::vector<int> stayed(before.patches.size());
     for (std::size_t c = 0; c < before.lane.size(); ++c) {
@@ -274,6 +295,12 @@ struct Counts {
     for (std::size_t n = 0; n < before.patches.size() && now.groups_built == before.groups_built;
          ++n)
       moved += before.patches[n].own.first != now.patches[n].own.first;
+    const auto &parts_before = before.transfer.parts, &parts = now.transfer.parts;
+    for (std::size_t n = 0; n < std::min(parts_before.size(), parts.size()); ++n) {
+      const std::int32_t more = parts_before[n].more_terms.size, is = parts[n].more_terms.size;
+      tiles += is > more;
+      whole += is == 0 && more > 0;
+    }
   }
 };
 
@@ -336,6 +363,8 @@ TEST(Patches, StayWholeUnderCuts) {
   EXPECT_GT(counts.added, 1000);
   EXPECT_GT(counts.alone, 1000);
   EXPECT_GT(counts.moved, 10);
+  EXPECT_GT(counts.tiles, 10);
+  EXPECT_GT(counts.whole, 10);
 }
 
 }  // namespace

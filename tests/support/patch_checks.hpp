@@ -266,14 +266,18 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
 /// What the vertices of a block take: from its runs, or from terms; never both.
 template <class Add, class RowOf>
 void read_block(const cpu::Transfer& t, const cpu::TransferBlock& block, int count,
-                const std::uint8_t* terms, const Add& add, const RowOf& row_of) {
+                const cpu::TransferVertex* other, const Add& add, const RowOf& row_of) {
   std::vector<int> times(static_cast<std::size_t>(count));
+  const auto row_at = [&](int place) {
+    EXPECT_LT(place, count);
+    ++times[static_cast<std::size_t>(place)];
+    return row_of(place);
+  };
   for (int n = 0; n < block.runs; ++n) {
     const cpu::TransferRun& run = t.runs[static_cast<std::size_t>(block.first_run + n)];
     ASSERT_LE(run.first + run.size, count);
     for (int k = 0; k < run.size; ++k) {
-      ++times[static_cast<std::size_t>(run.first + k)];
-      auto* const row = row_of(run.first + k);
+      auto* const row = row_at(run.first + k);
       ASSERT_NE(row, nullptr);
       if (run.rows == cpu::TransferRun::kIdentity) {
         add(*row, run.point[0] + k, 1);
@@ -286,28 +290,33 @@ void read_block(const cpu::Transfer& t, const cpu::TransferBlock& block, int cou
     }
   }
   auto term = static_cast<std::size_t>(block.first_term);
-  bool others = false, gaps = false;
-  for (int k = 0; k < count; ++k) {
-    if (times[static_cast<std::size_t>(k)] > 0) {
-      EXPECT_EQ(times[static_cast<std::size_t>(k)], 1);
-      EXPECT_EQ(terms[k], 0);
-      continue;
-    }
-    auto* const row = row_of(k);
-    (row != nullptr ? others : gaps) = true;
-    if (row == nullptr) {
-      EXPECT_EQ(terms[k], 0);
-      continue;
-    }
-    const int size = terms[k] % cpu::Transfer::kMean;
-    bool alike = size > 0;
-    for (int n = 0; n < size; ++n, ++term) {
+  const auto read = [&](int terms) {
+    auto* const row = row_at(other->place());
+    ASSERT_NE(row, nullptr);
+    for (int n = 0; n < terms; ++n, ++term)
       add(*row, t.term_point[term], static_cast<float>(t.term_weight[term]) / 64);
-      alike = alike && size * t.term_weight[term] == 64;
+    ++other;
+  };
+  const auto is_mean = [&](int terms) {
+    for (int n = 0; n < terms; ++n)
+      if (terms * t.term_weight[term + static_cast<std::size_t>(n)] != 64) return false;
+    return std::set{1, 2, 4, 8}.count(terms) == 1;
+  };
+  for (int n = 0; n < cpu::TransferBlock::kMeans; ++n)
+    for (int k = 0; k < block.means[n]; ++k) {
+      EXPECT_TRUE(is_mean(1 << n));
+      read(1 << n);
     }
-    EXPECT_EQ(terms[k] >= cpu::Transfer::kMean, alike);
+  for (int k = 0; k < block.weighted; ++k) {
+    EXPECT_FALSE(is_mean(other->terms()));
+    read(other->terms());
   }
-  EXPECT_EQ(block.others, others);
+  bool gaps = false;
+  for (int k = 0; k < count; ++k) {
+    const bool none = times[static_cast<std::size_t>(k)] == 0;
+    gaps = gaps || none;
+    EXPECT_TRUE(times[static_cast<std::size_t>(k)] == 1 || row_of(k) == nullptr) << k;
+  }
   EXPECT_EQ(block.gaps, gaps);
 }
 
@@ -328,7 +337,7 @@ inline void expect_transfer(const PatchedLevel& l, const Level& next) {
       row[t.point[part.points.first + point]] += weight;
     };
     for (std::int32_t first = own.first; first < own.end(); first += kGroup)
-      read_block(t, t.tiles[first / kGroup], kGroup, t.terms.data() + first, add,
+      read_block(t, t.tiles[first / kGroup], kGroup, t.others.data() + first, add,
                  [&](int k) -> Row* {
                    const std::int32_t v = l.vertex[first + k];
                    if (v < 0) return nullptr;
@@ -338,7 +347,7 @@ inline void expect_transfer(const PatchedLevel& l, const Level& next) {
     std::int32_t first = part.leads.first;
     for (std::int32_t b = part.lead_blocks.first; b < part.lead_blocks.end(); ++b, first += kGroup)
       read_block(t, t.lead_blocks[b], std::min(kGroup, part.leads.end() - first),
-                 t.lead_terms.data() + first, add, [&](int k) -> Row* {
+                 t.lead_others.data() + first, add, [&](int k) -> Row* {
                    const std::int32_t v = l.vertex[t.lead[first + k]];
                    ++count[v];
                    return &rows[v];
