@@ -26,8 +26,8 @@ std::size_t FastBackend<S>::bytes() const {
   std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + rotations_.bytes() +
                     bytes_of(exact_materials_) + bytes_of(single_materials_);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.patched.bytes() + level.matrices.bytes() + bytes_of(level.inverse_diagonal) +
-           level.vectors.bytes();
+    sum += level.patched.bytes() + level.matrices.bytes() +
+           level.inverse_diagonal.size() * sizeof(S) + level.vectors.bytes();
   }
   if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.bytes();
   return sum;
@@ -84,9 +84,11 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
         make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
     level.bound = 0;
     level.solution_is_zero = false;
-    level.inverse_diagonal.assign(2 * kTileScalars * level.patched.tiles(), 0);
+    const std::size_t scalars = kTileScalars * level.patched.tiles();
+    if (updates_) level.inverse_diagonal.reserve(with_room(2 * scalars));
+    level.inverse_diagonal.assign(2 * scalars, 0);
     level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
-                         kTileScalars * level.patched.tiles());
+                         scalars, updates_);
   }
   folds_ = SlotTable<S>(hierarchy.lumped_mass ? kernels::MassModel::lumped
                                               : kernels::MassModel::consistent);

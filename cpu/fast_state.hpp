@@ -48,12 +48,14 @@ struct FastVector {
 /// so that what a run never uses costs nothing.
 class LazyVectors {
  public:
-  /// Forgets all. `exact`: of each vector, whether it is double. `scalars`: of one vector.
-  void assign(std::vector<bool> exact, std::size_t scalars) {
+  /// Forgets all. `exact`: of each vector, whether it is double. `scalars`: of one vector. `grow`:
+  /// with room, so that the first cut need not move what there is.
+  void assign(std::vector<bool> exact, std::size_t scalars, bool grow) {
     exact_ = std::move(exact);
     all_.clear();
     all_.resize(exact_.size());
     scalars_ = scalars;
+    grow_ = grow;
   }
   void append(bool exact) {
     exact_.push_back(exact);
@@ -67,23 +69,32 @@ class LazyVectors {
 
   FastVector& operator[](std::size_t x) {
     FastVector& vector = all_[x];
-    if (vector.is_empty() && exact_[x]) vector.exact.resize(scalars_);
-    if (vector.is_empty() && !exact_[x]) vector.single.resize(scalars_);
+    if (vector.is_empty() && exact_[x]) fill(vector.exact);
+    if (vector.is_empty() && !exact_[x]) fill(vector.single);
     return vector;
   }
   /// As it is: empty if it is zero and was not asked for.
   FastVector& held(std::size_t x) { return all_[x]; }
   const FastVector& held(std::size_t x) const { return all_[x]; }
+  /// Without room, which takes no memory before it is written.
   std::size_t bytes() const {
     std::size_t sum = 0;
-    for (const FastVector& vector : all_) sum += bytes_of(vector.single) + bytes_of(vector.exact);
+    for (const FastVector& vector : all_)
+      sum += vector.single.size() * sizeof(float) + vector.exact.size() * sizeof(double);
     return sum;
   }
 
  private:
+  template <class T>
+  void fill(Array<T>& vector) const {
+    if (grow_) vector.reserve(with_room(scalars_));
+    vector.resize(scalars_);
+  }
+
   std::vector<bool> exact_;
   std::vector<FastVector> all_;
   std::size_t scalars_ = 0;
+  bool grow_ = false;
 };
 
 /// Calls body(from, to) with the typed arrays of two vectors.
