@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "cpu/element_cells.hpp"
@@ -16,6 +17,7 @@
 #include "cpu/patch_sweep.hpp"
 #include "cpu/patched_level.hpp"
 #include "cpu/stored_matrices.hpp"
+#include "kernels/noise.hpp"
 
 namespace kerf {
 namespace {
@@ -306,6 +308,70 @@ TEST(Lanes, AreGatheredFromAnyNumberOfGroups) {
         const float entry = k == none ? 0 : entries[from];
         EXPECT_EQ(out[e][k], e == 0 ? 2 * entry : e == 1 ? 3 * entry : 7 + entry) << e << " " << k;
       }
+  }
+}
+
+/// Groups of all sorts: with codes, held ones with all entries, cells that are one element, and
+/// none.
+template <class S>
+cpu::StoredMatrices<S> some_matrices(bool coded, bool with_mass) {
+  cpu::PatchedLevel level;
+  level.kind = {cpu::kMerged,  cpu::kHeldMerged, cpu::kind_of_finest(0, false),
+                cpu::kIdle,    cpu::kMerged,     cpu::kGeneral,
+                cpu::kNoCells, cpu::kMerged};
+  level.cell.resize(cpu::kGroup * level.kind.size());
+  cpu::StoredMatrices<S> out;
+  out.start(level, coded, with_mass);
+  out.allocate();
+  std::uint64_t count = 0;
+  for (const std::size_t group : {0, 1, 4, 5, 7})
+    for (int first = 0; first < cpu::kGroup; first += Pack<S>::kLanes) {
+      Pack<S> entries[kernels::kEntries];
+      for (Pack<S>& entry : entries)
+        for (int k = 0; k < Pack<S>::kLanes; ++k)
+          entry.set(k, static_cast<S>(kernels::noise(count++)));
+      out.store(group, first, entries);
+    }
+  return out;
+}
+
+/// An entry as products read it; zero where it is not stored.
+template <class S>
+S entry_of(const cpu::StoredMatrices<S>& matrices, std::int32_t lane, int entry) {
+  const auto group = static_cast<std::size_t>(lane / cpu::kGroup);
+  if (lane < 0 || group == 2 || group == 3 || group == 6) return 0;
+  constexpr int kLanes = Pack<S>::kLanes;
+  const int within = lane % cpu::kGroup;
+  S out = 0;
+  matrices.read(group, within / kLanes * kLanes,
+                [&](const auto& entries, const Pack<S>& unit, auto translations) {
+                  if (translations() || entry < kernels::kModeEntries)
+                    out = (entries[entry] * unit)[within % kLanes];
+                });
+  return out;
+}
+
+TYPED_TEST(PointsOfPacks, MatricesOfSingleCellsComeFromAllSortsOfGroups) {
+  using S = TypeParam;
+  constexpr int kLanes = Pack<S>::kLanes, kAll = 8 * cpu::kGroup;
+  for (const auto& [coded, with_mass] : {std::pair{true, false}, {true, true}, {false, false}}) {
+    const cpu::StoredMatrices<S> matrices = some_matrices<S>(coded, with_mass);
+    const auto expect = [&](const auto& lane_of) {
+      std::int32_t lanes[kLanes];
+      for (int k = 0; k < kLanes; ++k) lanes[k] = lane_of(k);
+      Pack<S> out[kernels::kEntries];
+      std::fill(std::begin(out), std::end(out), Pack<S>(7));
+      matrices.gather(lanes, out);
+      for (int e = 0; e < kernels::kEntries; ++e)
+        for (int k = 0; k < kLanes; ++k)
+          ASSERT_EQ(out[e][k], entry_of(matrices, lanes[k], e)) << "lane " << lanes[k] << ", " << e;
+    };
+    expect([](int k) { return k; });                                       // with codes alone
+    expect([](int k) { return cpu::kGroup + k; });                         // held alone
+    expect([](int k) { return (37 * k + 5) % kAll; });                     // all sorts
+    expect([](int k) { return k % 3 == 1 ? -1 : (53 * k + 11) % kAll; });  // some absent
+    expect([](int k) { return 2 * cpu::kGroup + k; });                     // elements
+    expect([](int) { return -1; });
   }
 }
 
