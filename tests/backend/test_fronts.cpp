@@ -15,24 +15,16 @@
 #include "cpu/front_factor.hpp"
 #include "kernels/layout.hpp"
 #include "kernels/noise.hpp"
+#include "tests/support/cut_octree.hpp"
 #include "tests/support/problem.hpp"
 #include "tests/support/scenes.hpp"
 
 namespace kerf {
 namespace {
 
+using test::cut_octree;
 using test::Problem;
 using test::ProblemOptions;
-
-Problem cut_octree(bool duplicate) {
-  LinkedOctree body(test::box_body({56, 22, 18}), 2);
-  test::cut_plane(body, {9.3, 5.2, 4.1}, {1, 0.2, 0.3}, 5);
-  ProblemOptions options;
-  options.coarsest_vertices = 60;
-  options.duplicate_cells = duplicate;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
 
 // L^-1 and -K L^-1 from a matrix, against products with L and K.
 TEST(DenseFronts, InvertWhatTheyEliminate) {

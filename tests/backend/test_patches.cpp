@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/cut_octree.hpp"
 #include "tests/support/patch_checks.hpp"
 #include "tests/support/problem.hpp"
 
@@ -21,19 +22,10 @@ namespace {
 using cpu::kGroup;
 using cpu::PatchedLevel;
 using cpu::PatchMoves;
+using test::cut_octree;
 using test::patches_of;
 using test::Problem;
 using test::ProblemOptions;
-
-Problem cut_octree(bool duplicate) {
-  LinkedOctree body(test::box_body({56, 22, 18}), 2);
-  test::cut_plane(body, {9.3, 5.2, 4.1}, {1, 0.2, 0.3}, 5);
-  ProblemOptions options;
-  options.coarsest_vertices = 60;
-  options.duplicate_cells = duplicate;
-  options.with_oracle = false;
-  return {std::move(body), options};
-}
 
 TEST(Patches, AreWholeWhenMade) {
   const Problem p = cut_octree(true);
