@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// Elimination in a dense symmetric matrix, and the inverse of what it leaves, by tiles of rows and
-// four columns.
+// Elimination in a dense symmetric matrix, and the inverse of what it eliminates, by tiles of rows
+// and four columns. The columns of the factor are L over their own rows, and K over the rows below.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <type_traits>
 #include <vector>
 
@@ -41,7 +40,7 @@ class DenseFront {
     return true;
   }
 
-  /// Columns of G from those of L, from the last on.
+  /// L^-1 and -K L^-1 in place of L and K, from the last columns on.
   void invert() const {
     std::vector<double> factors;  // of four columns, below them
     for (int j = columns_ - 4; j >= 0; j -= 4) {
@@ -72,7 +71,8 @@ class DenseFront {
     using Sums = Rows[4];  // in four columns
 
     static void load(const double* from, Rows& to) {
-      for (int p = 0; p < kPacks; ++p) std::memcpy(&to.at[p].v, from + Q::kLanes * p, sizeof(Q));
+      for (int p = 0; p < kPacks; ++p)
+        to.at[p] = load_pack<double, Q::kLanes* int{sizeof(double)}>(from + Q::kLanes * p);
     }
     static void load_negative(const double* from, Rows& to) {
       load(from, to);
@@ -102,7 +102,7 @@ class DenseFront {
     with(Tile<FrontPack, 1>{});
   }
 
-  /// Rows of G from i on, in four columns from j on.
+  /// Rows of the inverse from i on, in four columns from j on.
   template <class T>
   void invert_tile(T tile, int i, int j, const double* factors, typename T::Sums& sum) const {
     typename T::Rows at;

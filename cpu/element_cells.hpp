@@ -148,21 +148,12 @@ template <class S, class Cells>
 std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int octants,
                            std::size_t count) {
   std::uint64_t out = 0;
-  for (int octant = 0; octant < octants; ++octant) {
-    const std::int32_t* const of = lanes + kGroup * octant;
-    const auto add = [&](std::size_t kind) {
-      const int material = cells.kind(static_cast<std::uint16_t>(kind)).material;
-      out |= std::uint64_t{1} << (material % 64);
-    };
-    int kind = -1;
-    if (are_of_one_kind<Pack<S>::kLanes>(cells, of, kind)) {
-      if (kind >= 0) add(static_cast<std::size_t>(kind));
-    } else {
-      for (int k = 0; k < Pack<S>::kLanes; ++k)
-        if (of[k] >= 0) add(cells.level.kind[of[k] / kGroup]);
-    }
-    if (count == 1 && out != 0) break;
-  }
+  for (int octant = 0; octant < octants; ++octant)
+    for (int k = 0; k < Pack<S>::kLanes; ++k)
+      if (const std::int32_t lane = lanes[kGroup * octant + k]; lane >= 0) {
+        out |= std::uint64_t{1} << (cells.kind(cells.level.kind[lane / kGroup]).material % 64);
+        if (count == 1) return out;
+      }
   return out;
 }
 

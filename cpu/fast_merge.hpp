@@ -193,8 +193,8 @@ class SlotColumns {
   SlotColumns(const SlotColumns&) = delete;
   SlotColumns& operator=(const SlotColumns&) = delete;
   SlotColumns(const Level& level, const std::int32_t* cells) {
-    std::uint32_t held[P::kLanes];
-    bool alike = true;  // the components
+    std::uint32_t held[P::kLanes];  // bit 3 j + c: component c of slot j
+    bool alike = true;              // the components
     for (int k = 0; k < P::kLanes; ++k) {
       if (cells[k] < 0) continue;
       held[k] = 0;
@@ -216,7 +216,7 @@ class SlotColumns {
         if (same < k)
           lanes.copy(k, same);
         else
-          put(level, cells[k], c, k, lanes);
+          lanes.put(k, component(level, cells[k], held[k] >> c));
       }
       lanes.columns(of_[c]);
       by_[c] = &of_[c];
@@ -229,17 +229,17 @@ class SlotColumns {
   }
 
  private:
-  static void put(const Level& level, std::int32_t cell, int component, int lane,
-                  WeightLanes<P>& lanes) {
+  /// `held`: bit 3 j of slot j.
+  static Weights component(const Level& level, std::int32_t cell, std::uint32_t held) {
     Weights fold, slots, out{};
     kernels::fold_weights(level.fold[cell], fold.w);
     slot_weights(level, cell, slots);
-    for (std::size_t j = 0; j < 8; ++j) {
-      if ((level.fixed[level.slots[cell][j]] >> component & 1) != 0) continue;
+    for (int j = 0; j < 8; ++j) {
+      if ((held >> 3 * j & 1) != 0) continue;
       for (int i = 0; i < 8; ++i)
         for (int m = 0; m < 8; ++m) out.w[i][m] += fold.w[i][j] * slots.w[j][m];
     }
-    lanes.put(lane, out);
+    return out;
   }
 
   kernels::WeightColumns<P> of_[3];

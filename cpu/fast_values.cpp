@@ -103,7 +103,6 @@ void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first
                                           Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
-  ensures(to.kind[group] == kGeneral, "a child that is passed on is taken for one of several");
   const GeneralChildren children(from, to, to.cell.data() + kGroup * group + first, P::kLanes);
   std::fill(std::begin(out), std::end(out), P(0));
   for_rounds<P>(children, [&](const auto& child, unsigned) {

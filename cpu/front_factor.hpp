@@ -93,7 +93,7 @@ class FrontFactor {
   }
 
   std::size_t bytes() const {
-    std::size_t sum = values_.capacity() * sizeof(S);
+    std::size_t sum = bytes_of(values_);
     for (const Array<double>& local : local_) sum += bytes_of(local);
     return sum;
   }
@@ -133,6 +133,7 @@ class FrontFactor {
     return matrix.value[matrix.column_begin[scalar(front, j)]];
   }
 
+  /// The columns of G, with what lies above their diagonal, which packs read.
   void keep(const Front& front, const DenseFront& dense) {
     S* to = values_.data() + front.at;
     for (int j = 0; j < front.padded_columns(); ++j, to += front.height()) {

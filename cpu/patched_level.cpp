@@ -164,6 +164,7 @@ class Patcher {
       twice = twice || (octants & bit) != 0;
       octants |= bit;
     }
+    ensures(!(passed && twice), "a cell that is passed on is not the only child");
     const bool held = out_.held[c] == kPartlyHeld;
     const bool masks = held && finer_->children.empty();  // children of level 0
     if (masks || twice || is_loose(c)) return passed ? kGeneralPassed : kGeneral;
