@@ -16,17 +16,6 @@ constexpr int kHalf = run_of(kTwoRows), kQuarter = run_of(kFourRows);
 
 std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 
-/// Bits of x with two zeros after each.
-std::uint64_t spread(std::uint64_t x) {
-  x &= 0x1FFFFF;
-  x = (x | x << 32) & 0x1F00000000FFFF;
-  x = (x | x << 16) & 0x1F0000FF0000FF;
-  x = (x | x << 8) & 0x100F00F00F00F00F;
-  x = (x | x << 4) & 0x10C30C30C30C30C3;
-  x = (x | x << 2) & 0x1249249249249249;
-  return x;
-}
-
 /// Orders points by z, then y, then x, so that rows of cells have rows of points.
 std::uint64_t place_key(const Vec3i& p) {
   const auto at = [&](std::size_t d) { return static_cast<std::uint64_t>(p[d]) & 0x1FFFFF; };
@@ -187,11 +176,6 @@ class Grouping {
 };
 
 }  // namespace
-
-std::uint64_t morton(const Vec3i& c) {
-  const auto at = [&](std::size_t d) { return spread(static_cast<std::uint64_t>(c[d])); };
-  return at(0) | at(1) << 1 | at(2) << 2;
-}
 
 void Numbering::number(Draft& draft, std::span<const std::int32_t> cells,
                        std::vector<Corners>& corners, std::vector<Corners>& slots) {

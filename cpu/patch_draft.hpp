@@ -125,7 +125,4 @@ void make_draft(const Level& level, Draft& draft, Numbering& numbering);
 /// How the points of a group lie: [8][kGroup] of corners. Lanes without a cell are pairs.
 RowKind row_kind(const std::uint16_t* corners);
 
-/// A number along a curve that stays within cubes.
-std::uint64_t morton(const Vec3i& point);
-
 }  // namespace kerf::cpu

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "cpu/halving.hpp"
 #include "cpu/patcher.hpp"
 #include "kernels/transfer.hpp"
 
@@ -21,27 +22,22 @@ std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 /// and all corners but one hanging.
 constexpr std::size_t kCrowd = 60000, kCellPoints = 15;
 
-/// Cells of a patch of a full level; levels with few cells have smaller ones, for the threads: more
-/// of them as long as they are not so small that most of their vertices are shared.
+/// Cells of a patch. Few patches share few vertices, but there are enough of them for the threads
+/// of a processor unless they would be tiny; and what the cells of one touch fits a cache.
 std::int32_t patch_cells(std::int32_t cells) {
-  constexpr std::int32_t kMost = 32768, kSmall = 2048, kLeast = 256;
-  std::int32_t size = kMost;
-  while (size > kLeast && cells < (size > kSmall ? 32 : 16) * size) size /= 2;
-  return size;
+  constexpr std::int32_t kMost = 32768, kLeast = 256, kEnough = 16;
+  std::int32_t patches = 1;
+  while (patches < kEnough && cells >= 2 * kLeast * patches) patches *= 2;
+  while (cells > kMost * patches) patches *= 2;
+  return (cells + patches - 1) / patches;
 }
 
-/// Cells along a curve that stays within cubes, in equal parts.
+/// Cells in equal parts of `size` at the most.
 std::vector<std::vector<std::int32_t>> divide(const Level& level,
                                               const std::vector<std::int32_t>& cells,
                                               std::int32_t size) {
-  std::vector<std::pair<std::uint64_t, std::int32_t>> order;
-  order.reserve(cells.size());
-  for (const std::int32_t c : cells) order.emplace_back(morton(level.corner[c]), c);
-  std::sort(order.begin(), order.end());
   const auto most = static_cast<std::size_t>(size);
-  std::vector<std::vector<std::int32_t>> parts((order.size() + most - 1) / most);
-  for (std::size_t i = 0; i < order.size(); ++i) parts[i / most].push_back(order[i].second);
-  return parts;
+  return halved(level, cells, (cells.size() + most - 1) / most);
 }
 
 bool is_same(const Level& level, std::int32_t c, const CellBefore& before) {

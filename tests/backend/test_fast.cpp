@@ -384,15 +384,38 @@ std::vector<Vector> results_of(const Problem& p, Backend& backend) {
   return out;
 }
 
-void expect_same_near(const Problem& p, const Backend& fast, int vector,
-                      const TriangleMesh& blade) {
+/// Whether a cell may be met if its vertices move by what they lose when they are rounded.
+bool may_be_met_rounded(const Problem& p, std::int32_t cell, const BladeReach& reach) {
+  constexpr double kRounding = 2e-7;
+  const Vector u = p.deformation();
+  const Level& level = p.hierarchy.levels[0];
+  Box3 box;
+  double farthest = 0;
+  for (const std::int32_t v : level.slots[cell]) {
+    Vec3d at;
+    for (int d = 0; d < 3; ++d) {
+      at[d] = p.hierarchy.spacing * level.point[v][d] + u[3 * v + d];
+      farthest = std::max(farthest, std::abs(at[d]));
+    }
+    box.add(at);
+  }
+  const double by = kRounding * farthest;
+  return reach.may_meet({box.lo - Vec3d{by, by, by}, box.hi + Vec3d{by, by, by}}, false);
+}
+
+void expect_near(const Problem& p, const Backend& fast, int vector, const TriangleMesh& blade) {
   const Vector at = p.deformation();
-  std::vector<std::int32_t> opened = opened_cells(p.body);
+  std::vector<std::int32_t> opened = opened_cells(p.body), others;
   std::sort(opened.begin(), opened.end());
   const BladeReach reach(blade, p.body.lattice().origin);
   const NearCells expected = near_cells(p.hierarchy, test::span_of(at), reach, opened),
                   found = fast.find_near(vector, reach, opened);
-  EXPECT_EQ(found.cells, expected.cells);
+  EXPECT_TRUE(std::is_sorted(found.cells.begin(), found.cells.end()));
+  EXPECT_TRUE(std::includes(found.cells.begin(), found.cells.end(), expected.cells.begin(),
+                            expected.cells.end()));
+  std::set_difference(found.cells.begin(), found.cells.end(), expected.cells.begin(),
+                      expected.cells.end(), std::back_inserter(others));
+  for (const std::int32_t c : others) EXPECT_TRUE(may_be_met_rounded(p, c, reach)) << "cell " << c;
   EXPECT_EQ(found.finite, expected.finite);
   for (int d = 0; d < 3; ++d) {
     EXPECT_EQ(found.bounds.lo[d], expected.bounds.lo[d]);
@@ -427,7 +450,7 @@ TEST(FastBackend, FollowsCutsAsIfLoadedAfterThem) {
       fast->read_rotations(rotation);
 
       const TriangleMesh blade = random.next();
-      expect_same_near(p, *fast, work, blade);
+      expect_near(p, *fast, work, blade);
       ASSERT_TRUE(p.update(updater, cut(p.body, {}, blade, i + 1)));
       const LevelChange& change = updater.change().levels[0];
       fast->update(p.hierarchy, updater.change());
