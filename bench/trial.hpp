@@ -65,7 +65,6 @@ struct Trial {
   std::unique_ptr<Surface> surface;
   std::unique_ptr<Hierarchy> hierarchy, previous;  // built by a phase, loaded into the backend
   std::unique_ptr<Structure> structure, structure_before;  // the same
-  std::vector<double> bent_values;
   CutEvent event;
 
   Backend& backend() { return machine.backend(); }

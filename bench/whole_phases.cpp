@@ -2,10 +2,10 @@
 #include <cmath>
 
 #include "bench/phases.hpp"
-#include "core/base/beside.hpp"
 #include "core/base/error.hpp"
 #include "core/base/timer.hpp"
 #include "core/body/cut.hpp"
+#include "core/near_leaves.hpp"
 #include "core/snapshot.hpp"
 
 namespace kerf::bench {
@@ -43,37 +43,20 @@ void prepare_cut(Trial& t) {
   t.surface = std::make_unique<Surface>(*t.octree, SurfaceMethod::dual_contouring);
   t.surface->bind(*t.octree);
   t.structure = std::make_unique<Structure>(t.body.setup(), *t.octree);
-  t.bent_values = t.body.bent(1);
   t.backend().load(t.structure->hierarchy());
   t.structure_before.reset();
   CutEvent nothing;
   nothing.cells_before = nothing.cells_after = t.octree->leaf_count();
   t.structure->update(*t.octree, nothing);
-  t.backend().write(0, t.machine.bent, t.bent_values);
-}
-
-// As a simulation asks.
-NearCells find_near(const Trial& t, const BladeReach& reach) {
-  if (t.machine.backend().can_update())
-    return t.machine.backend().find_near(t.machine.bent, reach, t.structure->opened());
-  return near_cells(t.structure->hierarchy(), t.bent_values, reach, t.structure->opened());
+  t.backend().write(0, t.machine.bent, t.body.bent(1));
 }
 
 void cut_octree(Trial& t) {
-  const Hierarchy& levels = t.structure->hierarchy();
-  const Vec3d origin = t.octree->lattice().origin;
-  const NearCells near = find_near(t, BladeReach(t.body.blade(), origin));
-  std::vector<double> of_slots;
-  for (const std::int32_t cell : near.cells)
-    for (const std::int32_t v : levels.levels[0].slots[cell])
-      for (std::size_t d = 0; d < 3; ++d)
-        of_slots.push_back(t.bent_values[3 * static_cast<std::size_t>(v) + d]);
-  const DeformedLeaves leaves{
-      {near.bounds.lo + origin, near.bounds.hi + origin},
-      near.cells,
-      corners_of_cells(t.octree->lattice(), levels.levels[0], near.cells, of_slots)};
+  const Backend& backend = t.backend();
+  const DeformedLeaves leaves =
+      leaves_near(backend, *t.structure, t.octree->lattice(), t.machine.bent, t.body.blade());
   const auto id = static_cast<std::int32_t>(t.body.setup().cuts.size()) + 1;
-  t.event = cut_near(*t.octree, leaves, t.body.blade(), id);
+  t.event = cut_near(*t.octree, leaves, t.body.blade(), id, backend.workers());
   ensures(t.event.changed(), "the blade of the bench meets its body");
 }
 
@@ -84,16 +67,14 @@ void run_cut_topology(Trial& t) {
 
 void run_cut(Trial& t) {
   cut_octree(t);
-  run_beside(
-      t.backend().threads() > 1,
+  bool in_place = false;
+  t.backend().workers().both(
       [&] {
         t.surface->update(*t.octree, t.event);
         t.surface->bind(*t.octree);
       },
-      [&] {
-        const bool in_place = t.structure->update(*t.octree, t.event);
-        follow(t.backend(), *t.structure, in_place);
-      });
+      [&] { in_place = t.structure->update(*t.octree, t.event); });
+  follow(t.backend(), *t.structure, in_place);
 }
 
 Outcome outcome_cut(Trial& t) {

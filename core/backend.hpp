@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/workers.hpp"
 #include "core/levels/corners.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/levels/update.hpp"
@@ -80,6 +81,8 @@ class Backend {
   /// device.
   virtual const char* instruction_set() const noexcept { return ""; }
   virtual int threads() const noexcept = 0;
+  /// Its threads, for host work between its own calls; read_some may be called from them.
+  virtual Workers workers() const { return {}; }
   virtual std::size_t bytes() const = 0;
   /// About how much memory of this machine a run takes for each cell of a refined body, all that
   /// others hold of it included; its surface is not.

@@ -9,7 +9,6 @@
 #include <numeric>
 #include <utility>
 
-#include "core/base/beside.hpp"
 #include "core/base/error.hpp"
 #include "core/base/hash.hpp"
 #include "core/base/memory.hpp"
@@ -18,6 +17,7 @@
 #include "core/fem/equilibrium.hpp"
 #include "core/fem/motion.hpp"
 #include "core/levels/corners.hpp"
+#include "core/near_leaves.hpp"
 #include "core/snapshot.hpp"
 #include "core/structure.hpp"
 #include "core/surface/surface.hpp"
@@ -37,14 +37,6 @@ struct Kept {
   std::vector<std::vector<double>> vectors;  // of the state
   std::vector<double> rotations;
 };
-
-std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices) {
-  std::vector<double> out;
-  out.reserve(3 * vertices.size());
-  for (const std::int32_t v : vertices)
-    for (std::size_t d = 0; d < 3; ++d) out.push_back(all[3 * static_cast<std::size_t>(v) + d]);
-  return out;
-}
 
 std::vector<std::shared_ptr<const Solid>> solids_of(const std::vector<Region>& regions) {
   std::vector<std::shared_ptr<const Solid>> out;
@@ -78,7 +70,7 @@ struct Simulation::Impl {
   void build_structure();
   void warn_of_idle_supports();
   void load_structure();
-  void change_structure(const CutEvent& event);
+  void follow_structure(bool in_place, Kept kept);
   void update_backend();
   Kept read_state(std::int32_t vertices, std::int32_t cells) const;
   void write_state(Kept kept);
@@ -88,7 +80,6 @@ struct Simulation::Impl {
   void check_memory() const;
   CutEvent make_cut(const DueCut& due);
   bool apply_cut(const DueCut& due, StepReport& report);
-  DeformedLeaves leaves_near(const TriangleMesh& blade) const;
   std::array<std::pair<int, bool>, 3> state_vectors() const;
   double natural_time() const;
   void copy_state(const StateVectors& from, const StateVectors& to);
@@ -259,40 +250,13 @@ double Simulation::Impl::natural_time() const {
   return length / std::sqrt(shear / setup.material.density);
 }
 
-// The deformed leaves that a blade may meet.
-DeformedLeaves Simulation::Impl::leaves_near(const TriangleMesh& blade) const {
-  const Vec3d origin = body.lattice().origin;
-  const BladeReach reach(blade, origin);
-  const Level& level = finest();
-  NearCells near;
-  std::vector<double> all, of_slots;
-  if (backend->can_update()) {
-    near = backend->find_near(state.displacement, reach, structure->opened());
-  } else {
-    all = read_vector(state.displacement);
-    near = near_cells(hierarchy(), all, reach, structure->opened());
-  }
-  expects(near.finite && std::isfinite(norm(near.bounds.extent())),
-          "the deformed positions of the body are not finite: the simulation has diverged");
-  std::vector<std::int32_t> vertices;
-  for (const std::int32_t cell : near.cells)
-    vertices.insert(vertices.end(), level.slots[cell].begin(), level.slots[cell].end());
-  if (backend->can_update()) {
-    of_slots.resize(3 * vertices.size());
-    backend->read_some(0, state.displacement, vertices, of_slots);
-  } else {
-    of_slots = values_at(all, vertices);
-  }
-  return {{near.bounds.lo + origin, near.bounds.hi + origin},
-          near.cells,
-          corners_of_cells(body.lattice(), level, near.cells, of_slots)};
-}
-
 CutEvent Simulation::Impl::make_cut(const DueCut& due) {
   const AddTime timer(clock.cut);
   if (!due.deformed || due.blade.triangles.empty()) return cut(body, {}, due.blade, due.cut_id);
   check_finite(due.blade, "the blade");
-  return cut_near(body, leaves_near(due.blade), due.blade, due.cut_id);
+  const DeformedLeaves leaves =
+      leaves_near(*backend, *structure, body.lattice(), state.displacement, due.blade);
+  return cut_near(body, leaves, due.blade, due.cut_id, backend->workers());
 }
 
 bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
@@ -300,14 +264,23 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
   if (event.changed()) check_memory();
-  // The surface needs the octree alone, and is as serial as the levels are.
-  const bool beside = surface && event.changed() && backend->threads() > 1;
-  run_beside(
-      beside, [&] { change_surface(event); },
-      [&] {
-        if (event.changed()) change_structure(event);
-      });
-  return event.changed();
+  if (!event.changed()) {
+    change_surface(event);
+    return false;
+  }
+  if (equilibrium) equilibrium->release();  // there is room for new patches then
+  Kept kept;
+  if (!backend->can_update()) kept = read_state(finest().vertices(), finest().cells());
+  // Both need the octree alone, and are serial.
+  bool in_place = false;
+  backend->workers().both([&] { change_surface(event); },
+                          [&] {
+                            const AddTime timer(clock.structure);
+                            in_place = structure->update(body, event);
+                          });
+  for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
+  follow_structure(in_place, std::move(kept));
+  return true;
 }
 
 // Vectors of the state, and whether they hold a displacement.
@@ -318,25 +291,13 @@ std::array<std::pair<int, bool>, 3> Simulation::Impl::state_vectors() const {
            {state.memory, memory_is_displacement}}};
 }
 
-void Simulation::Impl::change_structure(const CutEvent& event) {
-  const bool keeps = backend->can_update();
-  if (equilibrium) equilibrium->release();  // there is room for new patches then
-  Kept kept;
-  if (!keeps) kept = read_state(finest().vertices(), finest().cells());
-  bool in_place = false;
-  {
-    const AddTime timer(clock.structure);
-    in_place = structure->update(body, event);
-  }
-  for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
-  if (keeps && in_place) {
-    update_backend();
-  } else {
-    const LevelChange& change = structure->finest_change();
-    if (keeps) kept = read_state(change.vertices_before, change.cells_before);
-    load_structure();
-    write_state(std::move(kept));
-  }
+/// `kept`: what a backend that cannot follow held before.
+void Simulation::Impl::follow_structure(bool in_place, Kept kept) {
+  if (backend->can_update() && in_place) return update_backend();
+  const LevelChange& change = structure->finest_change();
+  if (backend->can_update()) kept = read_state(change.vertices_before, change.cells_before);
+  load_structure();
+  write_state(std::move(kept));
 }
 
 // All that a load forgets.

@@ -18,6 +18,7 @@
 #include "cpu/instruction_set.hpp"
 #include "cpu/level_store.hpp"
 #include "cpu/near_loops.hpp"
+#include "cpu/parallel_errors.hpp"
 #include "cpu/surface_loops.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/relax.hpp"
@@ -46,6 +47,7 @@ class CpuBackend final : public Backend {
   const char* name() const noexcept override { return "reference"; }
   const char* instruction_set() const noexcept override { return kInstructionSet; }
   int threads() const noexcept override { return threads_; }
+  Workers workers() const override { return workers_of(threads_); }
   std::size_t bytes() const override;
   void load(const Hierarchy& hierarchy) override;
   bool can_update() const noexcept override { return updates_; }

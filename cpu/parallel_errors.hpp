@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 //
-// Exceptions out of parallel regions, which must not leave them by themselves.
+// Loops on some threads, and exceptions out of them, which must not leave them by themselves.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <exception>
+
+#include "core/base/workers.hpp"
 
 namespace kerf::cpu {
 
@@ -40,6 +42,14 @@ void for_patches(std::int32_t begin, std::int32_t end, int threads, const Body& 
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) if (end - begin > 1)
   for (std::int32_t i = begin; i < end; ++i) errors.run([&] { body(i); });
   errors.rethrow();
+}
+
+/// Those of OpenMP for work of the host. Threads of its own would share processors with these,
+/// which look for more work for some milliseconds before they sleep.
+inline Workers workers_of(int threads) {
+  return {threads, [threads](int count, const Workers::Piece& piece) {
+            for_patches(0, count, threads, piece);
+          }};
 }
 
 }  // namespace kerf::cpu

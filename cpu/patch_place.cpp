@@ -105,20 +105,21 @@ void PatchPlacer::find_shared() {
 /// from now on, but to make room would be to move all vertices of the patch in all vectors. It does
 /// where the patch would have more shared vertices than own ones.
 void PatchPlacer::place_own(const Draft& draft) {
-  std::vector<std::int32_t> fresh, kept;
+  std::vector<std::int32_t> fresh;
   for (const std::int32_t v : draft.vertices)
     if (out_.packed[v] == claim(draft.patch)) fresh.push_back(v);
   if (fresh.empty() && !draft.anew) return;
   Patch& patch = out_.patches[draft.patch];
   Range& own = patch.own;
-  for (std::int32_t at = own.first; at < own.end(); ++at)
-    if (out_.vertex[at] >= 0) kept.push_back(at);
-  const std::size_t need = (kept.size() + fresh.size() + kGroup - 1) / kGroup;
+  const auto kept = static_cast<std::size_t>(std::count_if(out_.vertex.begin() + own.first,
+                                                           out_.vertex.begin() + own.end(),
+                                                           [](std::int32_t v) { return v >= 0; }));
+  const std::size_t need = (kept + fresh.size() + kGroup - 1) / kGroup;
   if (size_of(kGroup * need) > own.room) {
-    const std::size_t fit = static_cast<std::size_t>(own.room) - kept.size();
+    const std::size_t fit = static_cast<std::size_t>(own.room) - kept;
     const std::size_t shared = static_cast<std::size_t>(patch.copies.size) + fresh.size() - fit;
-    if (draft.anew || shared > kept.size()) {
-      move_own(draft.patch, need, kept);
+    if (draft.anew || shared > kept) {
+      move_own(draft.patch, need);
     } else {
       for (std::size_t n = fit; n < fresh.size(); ++n) share(fresh[n]);
       fresh.resize(fit);
@@ -135,10 +136,12 @@ void PatchPlacer::place_own(const Draft& draft) {
   own.size = std::max(own.size, end - own.first);
 }
 
-void PatchPlacer::move_own(std::int32_t patch, std::size_t tiles,
-                           const std::vector<std::int32_t>& kept) {
+void PatchPlacer::move_own(std::int32_t patch, std::size_t tiles) {
   Range& own = out_.patches[patch].own;
   const Range before = own;
+  std::vector<std::int32_t> kept;
+  for (std::int32_t at = before.first; at < before.end(); ++at)
+    if (out_.vertex[at] >= 0) kept.push_back(at);
   const auto room = size_of(own.room == 0 ? tiles : tiles + tiles / 4);
   own.first = add_tiles(room, patch);
   own.room = kGroup * room;
@@ -314,11 +317,12 @@ void PatchPlacer::fill(std::int32_t cell) {
 }
 
 void PatchPlacer::place_children() {
-  for (const Draft& draft : *drafts_) {
+  for_patches(0, size_of(drafts_->size()), threads_, [&](std::int32_t i) {
+    const Draft& draft = (*drafts_)[i];
     for (const auto* cells : {&draft.cells, &draft.refilled})
       for (const std::int32_t c : *cells)
         if (c >= 0) fill(c);
-  }
+  });
 }
 
 void PatchPlacer::place_moved_children(const PatchMoves& below) {

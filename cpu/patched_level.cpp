@@ -2,6 +2,7 @@
 #include "cpu/patched_level.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <iterator>
 #include <memory>
 #include <numeric>
@@ -100,7 +101,8 @@ class Patcher {
     std::vector<std::int32_t> moved;     // cells of another kind
     std::vector<std::int32_t> changed;   // cells with other slots
     std::vector<std::int32_t> refilled;  // cells that stay
-    bool transfers = false, drafted = false;
+    bool drafted = false;
+    char transfers = 0;  // whether vertices take other values
 
     bool any() const {
       return !arrived.empty() || !moved.empty() || !changed.empty() || !refilled.empty();
@@ -133,10 +135,19 @@ class Patcher {
 
   std::uint16_t kind_of(std::int32_t c) { return finer_ ? stored_kind(c) : finest_kind(c); }
 
-  std::uint16_t finest_kind(std::int32_t c) {
+  CellKind finest_values(std::int32_t c) const {
     const CellValues& v = hierarchy_.values[c];
-    const CellKind kind{v.stiffness, v.mass, hierarchy_.spacing * (1 << level_.size_log2[c]),
-                        v.material, out_.held[c] == kWhollyHeld};
+    return {v.stiffness, v.mass, hierarchy_.spacing * (1 << level_.size_log2[c]), v.material,
+            out_.held[c] == kWhollyHeld};
+  }
+  /// Whether a cell is of another kind than its group.
+  bool left_its_kind(std::int32_t c) const {
+    const std::uint16_t kind = out_.kind[out_.lane[c] / kGroup];
+    return finer_ ? stored_kind(c) != kind : !(finest_values(c) == out_.kinds[kind]);
+  }
+
+  std::uint16_t finest_kind(std::int32_t c) {
+    const CellKind kind = finest_values(c);
     std::vector<CellKind>& kinds = out_.kinds;
     if (last_kind_ >= kinds.size() || !(kinds[last_kind_] == kind))
       last_kind_ =
@@ -193,62 +204,100 @@ class Patcher {
     return out_.patch_of_cell(c < before ? c : change_->origin[c - before]);
   }
 
+  // All of it asks memory for one cell after the other, so threads share it.
   void mark(const LevelChange* above, const PatchMoves* below) {
-    std::vector<std::int32_t> also;
-    for (const std::int32_t v : change_->vertices) mark_vertex(v, also);
-    if (below != nullptr)
-      for (const std::int32_t child : below->held) also.push_back(finer_->level->parent[child]);
-    std::sort(also.begin(), also.end());
-    also.erase(std::unique(also.begin(), also.end()), also.end());
+    moves_.tiles.resize(out_.tiles());
     const std::vector<std::int32_t>& cells = change_->cells;
-    for (std::size_t i = 0; i < cells.size(); ++i)
-      touch(cells[i],
-            i >= change_->before.size() || !is_same(level_, cells[i], change_->before[i]));
-    for (const std::int32_t c : also)
-      if (!std::binary_search(cells.begin(), cells.end(), c)) touch(c, false);
+    std::vector<std::int32_t> all = cells;
+    for (const std::int32_t c : cells_beside(below))
+      if (!std::binary_search(cells.begin(), cells.end(), c)) all.push_back(c);
+    std::vector<CellMark> marks(all.size());
+    in_chunks(all.size(), [&](std::size_t i) {
+      marks[i].other = i < cells.size() && (i >= change_->before.size() ||
+                                            !is_same(level_, cells[i], change_->before[i]));
+      touch(all[i], marks[i]);
+    });
+    for (std::size_t i = 0; i < all.size(); ++i) list(all[i], marks[i]);
     if (above == nullptr) return;
-    for (std::size_t i = 0; i < above->cells.size(); ++i) {  // rows of the transfer
+    in_chunks(above->cells.size(), [&](std::size_t i) {  // rows of the transfer
       const std::int32_t parent = above->cells[i];
-      if (i < above->before.size() && is_same(*next_, parent, above->before[i])) continue;
+      if (i < above->before.size() && is_same(*next_, parent, above->before[i])) return;
       for (const std::int32_t c : next_->children_of(parent)) touch_transfers(c);
-    }
+    });
+  }
+
+  /// body(i) for i below `count`, on all threads.
+  template <class Body>
+  void in_chunks(std::size_t count, const Body& body) const {
+    constexpr std::size_t kChunk = 512;
+    for_patches(0, size_of((count + kChunk - 1) / kChunk), threads_, [&](std::int32_t chunk) {
+      const std::size_t first = kChunk * static_cast<std::size_t>(chunk);
+      for (std::size_t i = first; i < std::min(first + kChunk, count); ++i) body(i);
+    });
+  }
+  /// Threads may do so at once.
+  static void raise(char& flag) { std::atomic_ref(flag).store(1, std::memory_order_relaxed); }
+
+  /// Cells that change with vertices or with cells below, ascending.
+  std::vector<std::int32_t> cells_beside(const PatchMoves* below) {
+    std::vector<char> met(level_.corner.size());
+    in_chunks(change_->vertices.size(),
+              [&](std::size_t i) { mark_vertex(change_->vertices[i], met); });
+    if (below != nullptr)
+      for (const std::int32_t child : below->held) met[finer_->level->parent[child]] = 1;
+    std::vector<std::int32_t> out;
+    for (auto at = met.begin(); (at = std::find(at, met.end(), 1)) != met.end(); ++at)
+      out.push_back(size_of(static_cast<std::size_t>(at - met.begin())));
+    return out;
   }
 
   /// The vertices of a cell may take other values.
   void touch_transfers(std::int32_t c) {
-    works_[patch_of(c)].transfers = true;
+    raise(works_[patch_of(c)].transfers);
     for (const std::int32_t v : level_.slots[c]) touch_tile(v);
   }
   void touch_tile(std::int32_t v) {
-    if (out_.packed[v] >= 0) moves_.touch(out_.packed[v]);  // else it gets a place
+    if (out_.packed[v] >= 0) raise(moves_.tiles[out_.packed[v] / kGroup]);  // else it gets a place
   }
 
   /// The row of a vertex is that of its first cell, which may be another now.
-  void mark_vertex(std::int32_t v, std::vector<std::int32_t>& also) {
-    const bool is_new = v >= change_->vertices_before;
-    const bool held_otherwise = !is_new && out_.fixed[out_.packed[v]] != level_.fixed[v];
+  void mark_vertex(std::int32_t v, std::vector<char>& met) {
+    const bool is_fresh = v >= change_->vertices_before;
+    const bool held_otherwise = !is_fresh && out_.fixed[out_.packed[v]] != level_.fixed[v];
     const bool may_be_loose = finer_ != nullptr && finer_->children.empty();
     touch_tile(v);
     for (const std::int32_t item : level_.incidences_of(v)) {
-      works_[patch_of(item / 8)].transfers = true;
-      if (held_otherwise || may_be_loose) also.push_back(item / 8);
+      raise(works_[patch_of(item / 8)].transfers);
+      if (held_otherwise || may_be_loose) raise(met[item / 8]);
     }
   }
 
-  void touch(std::int32_t c, bool is_other) {
-    const bool is_new = c >= change_->cells_before;
+  struct CellMark {
+    bool other = false;  // corners or slots
+    bool held = false;   // HeldCell, or the cell is new
+    bool left = false;   // its kind
+  };
+
+  bool is_new(std::int32_t c) const { return c >= change_->cells_before; }
+
+  void touch(std::int32_t c, CellMark& mark) {
     const HeldCell held = held_of(c);
-    if (is_new || held != out_.held[c]) moves_.held.push_back(c);
+    mark.held = is_new(c) || held != out_.held[c];
     out_.held[c] = held;
+    mark.left = !is_new(c) && left_its_kind(c);
+    raise(works_[patch_of(c)].transfers);
+    if (is_new(c) || mark.other) touch_transfers(c);
+  }
+
+  void list(std::int32_t c, const CellMark& mark) {
+    if (mark.held) moves_.held.push_back(c);
     Work& work = works_[patch_of(c)];
-    work.transfers = true;
-    if (is_new || is_other) touch_transfers(c);
-    if (is_new) {
+    if (is_new(c)) {
       work.arrived.push_back(c);
-    } else if (kind_of(c) != out_.kind[out_.lane[c] / kGroup]) {
+    } else if (mark.left) {
       work.moved.push_back(c);
     } else {
-      if (is_other) work.changed.push_back(c);
+      if (mark.other) work.changed.push_back(c);
       if (finer_ != nullptr) work.refilled.push_back(c);
     }
   }

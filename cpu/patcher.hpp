@@ -39,7 +39,7 @@ class PatchPlacer {
   void share(std::int32_t vertex);
   void find_shared();
   void place_own(const Draft& draft);
-  void move_own(std::int32_t patch, std::size_t tiles, const std::vector<std::int32_t>& kept);
+  void move_own(std::int32_t patch, std::size_t tiles);
   void set_fixed();
 
   // Arrays.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/body/cell_map.hpp"
@@ -92,42 +93,155 @@ Box3 quantiser_box(const Box3& body, const Box3& blade) {
   return box;
 }
 
+Box3 bounds_of(const TriangleMesh& blade) {
+  Box3 box;
+  for (const auto& triangle : blade.triangles)
+    for (const std::int32_t p : triangle) box.add(blade.points[static_cast<std::size_t>(p)]);
+  return box;
+}
+
+/// A leaf whose box the blade's box meets, and which links of it were cut before.
+struct NearLeaf {
+  CellMap cell;
+  Box3 box;
+  std::uint8_t mask = 0;
+};
+
+/// Tests links of leaves; several of these may do so at once.
+class LinkTests {
+ public:
+  LinkTests(const LinkedOctree& body, const Quantiser& quantiser)
+      : body_(body), quantiser_(quantiser) {}
+
+  void test(const NearLeaf& leaf, const BladeTriangle& blade) {
+    blade_ = &blade;
+    mask_ = leaf.mask;
+    test_cube(leaf.cell, {0, 0, 0}, leaf.cell.side, leaf.box);
+  }
+  std::vector<Hit>& hits() { return hits_; }
+
+  /// How far the material of finest cell `c` reaches along its link at face 2 axis + side, as a
+  /// point of a finest leaf, for CellMap.
+  Vec3d far_end(const Vec3i& c, int face) const {
+    bool apart = false;
+    Vec3d q{1, 1, 1};
+    q[face / 2] += 2 * (face % 2 == 1 ? 1 : -1) * reach(c, face, &apart);
+    return q;
+  }
+
+ private:
+  /// Tests the finest cells in a cube of a leaf; `low` counts from the leaf's low corner.
+  void test_cube(const CellMap& cell, const Vec3i& low, std::int32_t size, const Box3& box) {
+    if (!box.overlaps(blade_->box) || !blade_->near_plane(box)) return;
+    if (size == 1) {
+      test_finest(cell, low);
+      return;
+    }
+    const std::int32_t half = size / 2;
+    for (int i = 0; i < 8; ++i) {
+      const Vec3i part{low[0] + (i & 1) * half, low[1] + (i >> 1 & 1) * half,
+                       low[2] + (i >> 2) * half};
+      test_cube(cell, part, half, box_of(cell, part, half));
+    }
+  }
+
+  /// The same in cells from the centre: to the shared face, or to where the link was cut before.
+  double reach(const Vec3i& c, int face, bool* apart) const {
+    Vec3i lower = c;
+    lower[static_cast<std::size_t>(face / 2)] += face % 2 - 1;
+    const LinkCut* record = body_.record(lower, face / 2);
+    *apart = record != nullptr;
+    if (record == nullptr) return 0.5;
+    return record->end[1 - face % 2].distance / body_.lattice().spacing + kSamePlace;
+  }
+
+  /// Tests the parts of the six links of finest cell `v` of a leaf that move with it.
+  void test_finest(const CellMap& cell, const Vec3i& v) {
+    const Lattice& lattice = body_.lattice();
+    const Vec3i c{cell.corner[0] + v[0], cell.corner[1] + v[1], cell.corner[2] + v[2]};
+    const Vec3i center{2 * v[0] + 1, 2 * v[1] + 1, 2 * v[2] + 1};
+    const Int3 p = quantiser_(cell.position(center));
+    for (int face = 0; face < 6; ++face) {
+      const int axis = face / 2, side = face % 2;
+      Vec3i neighbour = c, lower = c;
+      neighbour[static_cast<std::size_t>(axis)] += 2 * side - 1;
+      lower[static_cast<std::size_t>(axis)] += side - 1;
+      bool apart = false;
+      const double length = (mask_ >> face & 1) != 0 ? reach(c, face, &apart) : 0.5;
+      Vec3d far{1.0 * center[0], 1.0 * center[1], 1.0 * center[2]};
+      far[axis] += (2 * side - 1) * 2 * length;
+      double t = 0;
+      if (segment_crosses_triangle(p, quantiser_(cell.position_at(far)), blade_->points[0],
+                                   blade_->points[1], blade_->points[2], &t) == 0 ||
+          body_.leaf_at(neighbour) < 0)
+        continue;
+      hits_.push_back({lattice.link_key(lower, axis), 1 - side, length * t * lattice.spacing, apart,
+                       reference_normal(cell, center)});
+    }
+  }
+
+  Vec3f reference_normal(const CellMap& cell, const Vec3i& center) const {
+    Vec3d n = cell.pull_back(center, blade_->normal);
+    const double size = largest(n);
+    n = size > 0 && std::isfinite(size) ? (1 / size) * n : blade_->normal;
+    n = (1 / norm(n)) * n;
+    return {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)};
+  }
+
+  const LinkedOctree& body_;
+  const Quantiser& quantiser_;
+  const BladeTriangle* blade_ = nullptr;  // the triangle at hand
+  std::uint8_t mask_ = 0;                 // of the leaf at hand
+  std::vector<Hit> hits_;
+};
+
 /// Finds the links that a blade crosses.
 class LinkSearch {
  public:
-  /// `corners` holds eight for each leaf of `numbers`, or none in the reference state.
-  LinkSearch(const LinkedOctree& body, std::span<const std::int32_t> numbers,
-             std::span<const Vec3d> corners, const Box3& body_box, const TriangleMesh& blade,
-             const Box3& blade_box)
+  LinkSearch(const LinkedOctree& body, const Box3& body_box, const TriangleMesh& blade,
+             const Workers& workers)
       : body_(body),
-        quantiser_(quantiser_box(body_box, blade_box)),
+        workers_(workers),
+        blade_box_(bounds_of(blade)),
+        quantiser_(quantiser_box(body_box, blade_box_)),
         // Small query boxes along a slanted triangle, but not too many if the body has grown.
         reach_(std::max(4 * body.lattice().spacing, largest(body_box.extent()) / 256)),
         margin_(4 * quantiser_.unit() +
                 32 * std::numeric_limits<double>::epsilon() *
-                    std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box.lo),
-                              largest(blade_box.hi)})),
-        triangles_(prepare(blade)),
-        near_(leaves_near(numbers, corners, blade_box)),
-        tree_(boxes_),
-        tested_(near_.size(), -1) {}
+                    std::max({largest(body_box.lo), largest(body_box.hi), largest(blade_box_.lo),
+                              largest(blade_box_.hi)})),
+        triangles_(prepare(blade)) {}
 
-  void run() {
-    for (const BladeTriangle& triangle : triangles_) {
-      ++number_;
-      blade_ = triangle;
-      search(triangle.corners);
+  /// All crossings, by link. `corners` holds eight for each leaf of `numbers`, or none in the
+  /// reference state.
+  std::vector<Hit> run(std::span<const std::int32_t> numbers, std::span<const Vec3d> corners) {
+    Box3 blade_box = blade_box_;
+    inflate(blade_box, margin_);
+    std::vector<Found> found(workers_.parts_of(numbers.size()));
+    workers_.share(numbers.size(), [&](std::size_t part, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        look_at(numbers[i], corners.empty() ? nullptr : corners.data() + 8 * i, blade_box,
+                found[part]);
+    });
+    std::vector<Hit> hits;
+    std::vector<NearLeaf> near;
+    for (Found& part : found) {
+      hits.insert(hits.end(), part.hits.begin(), part.hits.end());
+      near.insert(near.end(), part.near.begin(), part.near.end());
     }
-  }
-
-  /// All crossings so far, by link.
-  std::vector<Hit> take_hits() {
-    std::stable_sort(hits_.begin(), hits_.end(),
+    if (!are_few()) hits = search_tree(near);
+    std::stable_sort(hits.begin(), hits.end(),
                      [](const Hit& a, const Hit& b) { return a.key < b.key; });
-    return std::move(hits_);
+    return hits;
   }
 
  private:
+  /// Of some leaves: what the blade crosses, if its triangles are few; else those that it may.
+  struct Found {
+    std::vector<Hit> hits;
+    std::vector<NearLeaf> near;
+  };
+
   /// The triangles that have an area.
   std::vector<BladeTriangle> prepare(const TriangleMesh& blade) const {
     std::vector<BladeTriangle> out;
@@ -148,149 +262,76 @@ class LinkSearch {
     return out;
   }
 
-  /// Whether a box can meet the blade; a blade of many triangles is not looked at closely.
-  bool may_meet_blade(const Box3& box) const {
+  /// Each leaf is tested against each of a few triangles; of many, only against those near it.
+  bool are_few() const {
     constexpr std::size_t kFew = 16;
-    return triangles_.size() > kFew ||
-           std::any_of(triangles_.begin(), triangles_.end(), [&](const BladeTriangle& t) {
-             return box.overlaps(t.box) && t.near_plane(box);
-           });
+    return triangles_.size() <= kFew;
   }
 
-  /// The leaves whose boxes the blade's box meets; their boxes go to boxes_.
-  std::vector<CellMap> leaves_near(std::span<const std::int32_t> numbers,
-                                   std::span<const Vec3d> corners, Box3 blade_box) {
-    inflate(blade_box, margin_);
-    std::vector<CellMap> near;
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(numbers[i])];
-      const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
-      const CellMap cell{&body_.lattice(), node.corner, 1 << node.size_log2,
-                         corners.empty() ? nullptr : corners.data() + 8 * i};
-      Box3 box = box_of(cell, {0, 0, 0}, cell.side);
-      // Parts of links that were cut may reach beyond the cell.
-      for (int face = 0; node.size_log2 == 0 && face < 6; ++face)
-        if ((node.cut_mask >> face & 1) != 0) box.add(cell.position_at(far_end(node.corner, face)));
-      if (!box.overlaps(blade_box) || !may_meet_blade(box)) continue;
-      near.push_back(cell);
-      masks_.push_back(node.size_log2 == 0 ? node.cut_mask : std::uint8_t{0});
-      boxes_.push_back(box);
-    }
-    return near;
+  void look_at(std::int32_t number, const Vec3d* corners, const Box3& blade_box,
+               Found& found) const {
+    LinkTests tests(body_, quantiser_);
+    const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(number)];
+    const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
+    NearLeaf near{{&body_.lattice(), node.corner, 1 << node.size_log2, corners}, {}, 0};
+    near.box = box_of(near.cell, {0, 0, 0}, near.cell.side);
+    if (node.size_log2 == 0) near.mask = node.cut_mask;
+    // Parts of links that were cut may reach beyond the cell.
+    for (int face = 0; face < 6; ++face)
+      if ((near.mask >> face & 1) != 0)
+        near.box.add(near.cell.position_at(tests.far_end(node.corner, face)));
+    if (!near.box.overlaps(blade_box)) return;
+    if (!are_few()) return found.near.push_back(near);
+    tests.hits().swap(found.hits);
+    for (const BladeTriangle& triangle : triangles_) tests.test(near, triangle);
+    tests.hits().swap(found.hits);
+  }
+
+  std::vector<Hit> search_tree(const std::vector<NearLeaf>& near) const {
+    std::vector<Box3> boxes;
+    boxes.reserve(near.size());
+    for (const NearLeaf& leaf : near) boxes.push_back(leaf.box);
+    const Bvh tree(std::move(boxes));
+    std::vector<std::size_t> tested(near.size());  // the last triangle, from 1
+    LinkTests tests(body_, quantiser_);
+    for (std::size_t n = 0; n < triangles_.size(); ++n)
+      search(tree, triangles_[n].corners, [&](std::int32_t leaf) {
+        const auto i = static_cast<std::size_t>(leaf);
+        if (std::exchange(tested[i], n + 1) != n + 1) tests.test(near[i], triangles_[n]);
+      });
+    return std::move(tests.hits());
   }
 
   /// Queries the tree along a part of the triangle; parts are halved until their boxes are tight.
-  void search(const std::array<Vec3d, 3>& part) {
+  template <class Body>
+  void search(const Bvh& tree, const std::array<Vec3d, 3>& part, const Body& body) const {
     Box3 box;
     for (const Vec3d& p : part) box.add(p);
     inflate(box, margin_);
-    if (!box.overlaps(tree_.bounds())) return;
+    if (!box.overlaps(tree.bounds())) return;
     std::size_t longest = 0;  // edge i is opposite to point i
     double length = -1;
     for (std::size_t i = 0; i < 3; ++i) {
       const double l = largest(part[(i + 1) % 3] - part[(i + 2) % 3]);
       if (l > length) {
-        length = l;
         longest = i;
+        length = l;
       }
     }
-    if (length <= reach_) {
-      tree_.query(box, [this](std::int32_t leaf) { test_leaf(static_cast<std::size_t>(leaf)); });
-      return;
-    }
+    if (length <= reach_) return tree.query(box, body);
     const Vec3d &a = part[(longest + 1) % 3], &b = part[(longest + 2) % 3];
     const Vec3d middle = 0.5 * a + 0.5 * b;
-    search({part[longest], a, middle});
-    search({part[longest], middle, b});
-  }
-
-  void test_leaf(std::size_t leaf) {
-    if (tested_[leaf] == number_) return;
-    tested_[leaf] = number_;
-    mask_ = masks_[leaf];
-    test_cube(near_[leaf], {0, 0, 0}, near_[leaf].side, boxes_[leaf]);
-  }
-
-  /// Tests the finest cells in a cube of a leaf; `low` counts from the leaf's low corner.
-  void test_cube(const CellMap& cell, const Vec3i& low, std::int32_t size, const Box3& box) {
-    if (!box.overlaps(blade_.box) || !blade_.near_plane(box)) return;
-    if (size == 1) {
-      test_finest(cell, low);
-      return;
-    }
-    const std::int32_t half = size / 2;
-    for (int i = 0; i < 8; ++i) {
-      const Vec3i part{low[0] + (i & 1) * half, low[1] + (i >> 1 & 1) * half,
-                       low[2] + (i >> 2) * half};
-      test_cube(cell, part, half, box_of(cell, part, half));
-    }
-  }
-
-  /// How far the material of finest cell `c` reaches along its link at face 2 axis + side, in cells
-  /// from the centre: to the shared face, or to where the link was cut before.
-  double reach(const Vec3i& c, int face, bool* apart) const {
-    Vec3i lower = c;
-    lower[static_cast<std::size_t>(face / 2)] += face % 2 - 1;
-    const LinkCut* record = body_.record(lower, face / 2);
-    *apart = record != nullptr;
-    if (record == nullptr) return 0.5;
-    return record->end[1 - face % 2].distance / body_.lattice().spacing + kSamePlace;
-  }
-  /// The same as a point of a finest leaf, for CellMap.
-  Vec3d far_end(const Vec3i& c, int face) const {
-    bool apart = false;
-    Vec3d q{1, 1, 1};
-    q[face / 2] += 2 * (face % 2 == 1 ? 1 : -1) * reach(c, face, &apart);
-    return q;
-  }
-
-  /// Tests the parts of the six links of finest cell `v` of a leaf that move with it.
-  void test_finest(const CellMap& cell, const Vec3i& v) {
-    const Lattice& lattice = body_.lattice();
-    const Vec3i c{cell.corner[0] + v[0], cell.corner[1] + v[1], cell.corner[2] + v[2]};
-    const Vec3i center{2 * v[0] + 1, 2 * v[1] + 1, 2 * v[2] + 1};
-    const Int3 p = quantiser_(cell.position(center));
-    for (int face = 0; face < 6; ++face) {
-      const int axis = face / 2, side = face % 2;
-      Vec3i neighbour = c, lower = c;
-      neighbour[static_cast<std::size_t>(axis)] += 2 * side - 1;
-      lower[static_cast<std::size_t>(axis)] += side - 1;
-      bool apart = false;
-      const double length = (mask_ >> face & 1) != 0 ? reach(c, face, &apart) : 0.5;
-      Vec3d far{1.0 * center[0], 1.0 * center[1], 1.0 * center[2]};
-      far[axis] += (2 * side - 1) * 2 * length;
-      double t = 0;
-      if (segment_crosses_triangle(p, quantiser_(cell.position_at(far)), blade_.points[0],
-                                   blade_.points[1], blade_.points[2], &t) == 0 ||
-          body_.leaf_at(neighbour) < 0)
-        continue;
-      hits_.push_back({lattice.link_key(lower, axis), 1 - side, length * t * lattice.spacing, apart,
-                       reference_normal(cell, center)});
-    }
-  }
-
-  Vec3f reference_normal(const CellMap& cell, const Vec3i& center) const {
-    Vec3d n = cell.pull_back(center, blade_.normal);
-    const double size = largest(n);
-    n = size > 0 && std::isfinite(size) ? (1 / size) * n : blade_.normal;
-    n = (1 / norm(n)) * n;
-    return {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)};
+    search(tree, {part[longest], a, middle}, body);
+    search(tree, {part[longest], middle, b}, body);
   }
 
   const LinkedOctree& body_;
+  const Workers& workers_;
+  Box3 blade_box_;
   Quantiser quantiser_;
   double reach_;   // of the parts of a triangle that are searched at a time, m
   double margin_;  // covers the rounding of every box, m
   std::vector<BladeTriangle> triangles_;
-  std::vector<Box3> boxes_;          // of the leaves near the blade
-  std::vector<std::uint8_t> masks_;  // and which links of theirs were cut before
-  std::vector<CellMap> near_;
-  Bvh tree_;
-  std::vector<std::int32_t> tested_;  // per near leaf: the last triangle it was tested against
-  BladeTriangle blade_;               // the triangle at hand
-  std::int32_t number_ = 0;
-  std::uint8_t mask_ = 0;  // of the leaf at hand
-  std::vector<Hit> hits_;
 };
 
 /// The box of the body as it lies. @throws Error if a position is not finite.
@@ -305,13 +346,6 @@ Box3 bounds_of(const LinkedOctree& body, std::span<const Vec3d> corners) {
             "the deformed positions of the body are not finite: the simulation has diverged");
     box.add(p);
   }
-  return box;
-}
-
-Box3 bounds_of(const TriangleMesh& blade) {
-  Box3 box;
-  for (const auto& triangle : blade.triangles)
-    for (const std::int32_t p : triangle) box.add(blade.points[static_cast<std::size_t>(p)]);
   return box;
 }
 
@@ -365,10 +399,9 @@ bool comes_nearer(const LinkCut& cut, const LinkCut& recorded) {
 
 /// What the blade pass of `leaves` does to the body. Needs  a blade with triangles.
 CutEvent cut_leaves(LinkedOctree& body, const Box3& body_box, std::span<const std::int32_t> numbers,
-                    std::span<const Vec3d> corners, const TriangleMesh& blade, CutEvent event) {
-  LinkSearch search(body, numbers, corners, body_box, blade, bounds_of(blade));
-  search.run();
-  const std::vector<Hit> hits = search.take_hits();
+                    std::span<const Vec3d> corners, const TriangleMesh& blade, CutEvent event,
+                    const Workers& workers) {
+  const std::vector<Hit> hits = LinkSearch(body, body_box, blade, workers).run(numbers, corners);
 
   // From here on the body changes, and nothing in the input can be wrong any more.
   const Lattice lattice = body.lattice();
@@ -468,16 +501,16 @@ CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleM
     numbers.resize(body.leaf_count());
     std::iota(numbers.begin(), numbers.end(), 0);
   }
-  return cut_leaves(body, body_box, numbers, corners, blade, event);
+  return cut_leaves(body, body_box, numbers, corners, blade, event, {});
 }
 
 CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
-                  std::int32_t cut_id) {
+                  std::int32_t cut_id, const Workers& workers) {
   const CutEvent event = begin_event(body, cut_id);
   expects(leaves.corners.size() == 8 * leaves.numbers.size(),
           "the deformed positions must number eight for each leaf near the blade");
   if (!meets(leaves.bounds, blade)) return event;
-  return cut_leaves(body, leaves.bounds, leaves.numbers, leaves.corners, blade, event);
+  return cut_leaves(body, leaves.bounds, leaves.numbers, leaves.corners, blade, event, workers);
 }
 
 }  // namespace kerf

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/workers.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/geometry/triangle_mesh.hpp"
 
@@ -79,8 +80,9 @@ class BladeReach {
 ///         million times larger than the body. The body is unchanged after a throw.
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,
              std::int32_t cut_id);
-/// The same, from the corners of the leaves near the blade alone.
+/// The same, from the corners of the leaves near the blade alone. However many workers there are,
+/// the body is cut alike.
 CutEvent cut_near(LinkedOctree& body, const DeformedLeaves& leaves, const TriangleMesh& blade,
-                  std::int32_t cut_id);
+                  std::int32_t cut_id, const Workers& workers = {});
 
 }  // namespace kerf
