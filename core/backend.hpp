@@ -81,7 +81,8 @@ class Backend {
   /// device.
   virtual const char* instruction_set() const noexcept { return ""; }
   virtual int threads() const noexcept = 0;
-  /// Its threads, for host work between its own calls; read_some may be called from them.
+  /// Its threads, for host work between its own calls. Of these only read_some may be called from
+  /// them, at once.
   virtual Workers workers() const { return {}; }
   virtual std::size_t bytes() const = 0;
   /// About how much memory of this machine a run takes for each cell of a refined body, all that

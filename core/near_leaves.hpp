@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+//
+// From what a backend holds of the deformed body to what the octree cuts.
 #pragma once
 
 #include "core/backend.hpp"

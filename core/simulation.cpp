@@ -263,15 +263,15 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   const CutEvent event = make_cut(due);
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
-  if (event.changed()) check_memory();
   if (!event.changed()) {
     change_surface(event);
     return false;
   }
+  check_memory();
   if (equilibrium) equilibrium->release();  // there is room for new patches then
   Kept kept;
   if (!backend->can_update()) kept = read_state(finest().vertices(), finest().cells());
-  // Both need the octree alone, and are serial.
+  // Both need the octree alone, and are serial; the backend does nothing until both have ended.
   bool in_place = false;
   backend->workers().both([&] { change_surface(event); },
                           [&] {

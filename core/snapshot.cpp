@@ -85,14 +85,6 @@ std::vector<Vec3d> cell_corners(const Lattice& lattice, const Level& level,
   return out;
 }
 
-std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices) {
-  std::vector<double> out;
-  out.reserve(3 * vertices.size());
-  for (const std::int32_t v : vertices)
-    for (std::size_t d = 0; d < 3; ++d) out.push_back(all[3 * static_cast<std::size_t>(v) + d]);
-  return out;
-}
-
 std::vector<Vec3d> corners_of_cells(const Lattice& lattice, const Level& level,
                                     std::span<const std::int32_t> cells,
                                     std::span<const double> of_slots) {

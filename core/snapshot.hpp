@@ -14,9 +14,6 @@ namespace kerf {
 std::vector<Vec3d> cell_corners(const Lattice& lattice, const Level& level,
                                 std::span<const double> displacement);
 
-/// Of a vector of all vertices, what it holds at some: three each.
-std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices);
-
 /// Deformed positions of the corners of some cells, from the displacements of their slots, eight
 /// times three for each.
 std::vector<Vec3d> corners_of_cells(const Lattice& lattice, const Level& level,

@@ -64,6 +64,7 @@ struct TurnedCells {
 };
 
 constexpr int kAnyMaterial = -1;
+constexpr std::size_t kMostNumbered = std::size_t{1} << 31;  // by 32 bits
 
 /// Rotations of some lanes (-1: any; needs a lane 0 with one). Those of one group lie behind those
 /// of the one before.
@@ -81,6 +82,13 @@ void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat
       out = {component(0), component(1), component(2), component(3)};
       return;
     }
+    if constexpr (std::is_same_v<Cells, FinestCells<S>>)
+      if (4 * cells.level.cell.size() < kMostNumbered) {
+        Pack<S> q[4];
+        gather_fours(cells.rotation(0), lanes, q);
+        out = {q[0], q[1], q[2], q[3]};
+        return;
+      }
   }
 #endif
   // No lane is asked whether it is there: that cannot be foreseen.

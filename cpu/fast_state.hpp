@@ -149,7 +149,10 @@ class FastBackend final : public Backend {
   const char* name() const noexcept override { return "cpu"; }
   const char* instruction_set() const noexcept override { return kInstructionSet; }
   int threads() const noexcept override { return threads_; }
-  Workers workers() const override { return workers_of(threads_); }
+  Workers workers() const override {
+    const_cast<FastBackend*>(this)->settle();  // else read_some would, on each of them
+    return workers_of(threads_);
+  }
   std::size_t bytes() const override;
   double bytes_per_cell() const noexcept override;
   void load(const Hierarchy& hierarchy) override;

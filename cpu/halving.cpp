@@ -34,6 +34,7 @@ class Halving {
       part.reserve(static_cast<std::size_t>(end - begin));
       std::transform(begin, end, std::back_inserter(part),
                      [](const Item& item) { return item.cell; });
+      std::sort(part.begin(), part.end());  // libraries part a range in orders of their own
       return;
     }
     const std::size_t first = (parts + 1) / 2, count = static_cast<std::size_t>(end - begin);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -59,7 +60,7 @@ Box3 before_rounding(const PlaceBox<RoundedPlace>& rounded) {
   return box;
 }
 
-/// The same of sixteen at a time, one in each lane.
+/// As PlaceBox, of sixteen places at a time: one in each lane.
 class TileBox {
  public:
   TileBox() {
@@ -110,6 +111,7 @@ class NearPatches {
     out.finite = std::accumulate(std::begin(none), std::end(none), 0.0) == 0;
     out.bounds = bounds.box();
     if (!reach_.may_meet(out.bounds, false)) return;
+    if (!fits_single(out.bounds)) return add_all(patch, out);
     std::fill_n(at.begin() + kNothing, kNothings, RoundedPlace{kNowhere, kNowhere, kNowhere, 0});
     const auto end = static_cast<std::size_t>(patch.groups.end());
     for (auto g = static_cast<std::size_t>(patch.groups.first); g < end; g += kTogether)
@@ -127,6 +129,17 @@ class NearPatches {
 
  private:
   static constexpr std::size_t kTogether = 8;
+
+  static bool fits_single(const Box3& box) {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    return std::max({std::abs(box.lo.x), std::abs(box.lo.y), std::abs(box.lo.z), std::abs(box.hi.x),
+                     std::abs(box.hi.y), std::abs(box.hi.z)}) < kMost / 4;
+  }
+  void add_all(const Patch& patch, NearCells& out) const {
+    std::copy_if(level_.cell.begin() + kGroup * patch.groups.first,
+                 level_.cell.begin() + kGroup * patch.groups.end(), std::back_inserter(out.cells),
+                 [](std::int32_t c) { return c >= 0; });
+  }
 
   /// The own vertices from `first` on. What a tile has no vertex for is not a number, and so in no
   /// box.

@@ -12,8 +12,8 @@
 namespace kerf::cpu {
 
 /// As near_cells in core/levels/corners.hpp; the displacement in the order of the patches, m. Cells
-/// of a patch are looked at only where its vertices reach into the box of the blade, and their
-/// vertices are rounded to single precision: some may be among them that are as near as that.
+/// of a patch are looked at only where its vertices reach into the box of the blade. Places are
+/// rounded to single precision, so a few cells may be added that miss by no more than that.
 NearCells find_near(const PatchedLevel& level, double spacing, std::span<const double> displacement,
                     const BladeReach& reach, std::span<const std::int32_t> opened, int threads);
 

@@ -54,6 +54,16 @@ inline Pack<float> every_other(const float* low, const float* high, int first) {
       _mm512_permutex2var_ps(_mm512_loadu_ps(low), which, _mm512_loadu_ps(high)));
 }
 
+/// Four scalars for each of some numbers, below zero those of the first one. They lie as
+/// [number / 16][4][number % 16], and there are fewer than 2^31 of them.
+inline void gather_fours(const float* x, const std::int32_t* numbers, Pack<float> (&out)[4]) {
+  const __m512i number = _mm512_max_epi32(_mm512_loadu_si512(numbers), _mm512_setzero_si512());
+  const __m512i at = _mm512_add_epi32(_mm512_slli_epi32(_mm512_srli_epi32(number, 4), 6),
+                                      _mm512_and_si512(number, _mm512_set1_epi32(15)));
+  for (int c = 0; c < 4; ++c)
+    out[c].v = Pack<float>::Vector(_mm512_i32gather_ps(at, x + 16 * c, sizeof(float)));
+}
+
 /// Records of four registers, one after the other, by components.
 inline void transpose(__m512 a, __m512 b, __m512 c, __m512 d, kernels::Vec3<Pack<float>>& out) {
   const __m512i xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);

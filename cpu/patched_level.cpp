@@ -23,14 +23,15 @@ std::int32_t size_of(std::size_t n) { return static_cast<std::int32_t>(n); }
 /// and all corners but one hanging.
 constexpr std::size_t kCrowd = 60000, kCellPoints = 15;
 
-/// Cells of a patch. Few patches share few vertices, but there are enough of them for the threads
-/// of a processor unless they would be tiny; and what the cells of one touch fits a cache.
+/// Cells of a patch. Few patches share few vertices, but unless they would be tiny there is one for
+/// each of sixteen threads, whatever there are: results must not depend on their number. And what
+/// the cells of one touch fits a cache.
 std::int32_t patch_cells(std::int32_t cells) {
   constexpr std::int32_t kMost = 32768, kLeast = 256, kEnough = 16;
   std::int32_t patches = 1;
   while (patches < kEnough && cells >= 2 * kLeast * patches) patches *= 2;
-  while (cells > kMost * patches) patches *= 2;
-  return (cells + patches - 1) / patches;
+  while ((cells - 1) / kMost >= patches) patches *= 2;
+  return std::max(1, (cells + patches - 1) / patches);
 }
 
 /// Cells in equal parts of `size` at the most.
@@ -102,7 +103,7 @@ class Patcher {
     std::vector<std::int32_t> changed;   // cells with other slots
     std::vector<std::int32_t> refilled;  // cells that stay
     bool drafted = false;
-    char transfers = 0;  // whether vertices take other values
+    char transfers = 0;  // whether vertices take other values; raised by any thread
 
     bool any() const {
       return !arrived.empty() || !moved.empty() || !changed.empty() || !refilled.empty();
@@ -213,8 +214,8 @@ class Patcher {
       if (!std::binary_search(cells.begin(), cells.end(), c)) all.push_back(c);
     std::vector<CellMark> marks(all.size());
     in_chunks(all.size(), [&](std::size_t i) {
-      marks[i].other = i < cells.size() && (i >= change_->before.size() ||
-                                            !is_same(level_, cells[i], change_->before[i]));
+      marks[i].slots_changed = i < cells.size() && (i >= change_->before.size() ||
+                                                    !is_same(level_, cells[i], change_->before[i]));
       touch(all[i], marks[i]);
     });
     for (std::size_t i = 0; i < all.size(); ++i) list(all[i], marks[i]);
@@ -273,31 +274,31 @@ class Patcher {
   }
 
   struct CellMark {
-    bool other = false;  // corners or slots
-    bool held = false;   // HeldCell, or the cell is new
-    bool left = false;   // its kind
+    bool slots_changed = false;  // or the corner, or the fold
+    bool held_changed = false;   // or the cell is new
+    bool kind_changed = false;
   };
 
   bool is_new(std::int32_t c) const { return c >= change_->cells_before; }
 
   void touch(std::int32_t c, CellMark& mark) {
     const HeldCell held = held_of(c);
-    mark.held = is_new(c) || held != out_.held[c];
+    mark.held_changed = is_new(c) || held != out_.held[c];
     out_.held[c] = held;
-    mark.left = !is_new(c) && left_its_kind(c);
+    mark.kind_changed = !is_new(c) && left_its_kind(c);
     raise(works_[patch_of(c)].transfers);
-    if (is_new(c) || mark.other) touch_transfers(c);
+    if (is_new(c) || mark.slots_changed) touch_transfers(c);
   }
 
   void list(std::int32_t c, const CellMark& mark) {
-    if (mark.held) moves_.held.push_back(c);
+    if (mark.held_changed) moves_.held.push_back(c);
     Work& work = works_[patch_of(c)];
     if (is_new(c)) {
       work.arrived.push_back(c);
-    } else if (mark.left) {
+    } else if (mark.kind_changed) {
       work.moved.push_back(c);
     } else {
-      if (mark.other) work.changed.push_back(c);
+      if (mark.slots_changed) work.changed.push_back(c);
       if (finer_ != nullptr) work.refilled.push_back(c);
     }
   }

@@ -227,8 +227,9 @@ struct PatchedLevel {
   std::vector<std::int32_t> vertex;  // per packed vertex: that of the level, -1: none
   std::vector<std::int32_t> packed;  // per vertex of the level
   std::vector<std::uint8_t> fixed;   // per packed vertex, as Level::fixed
-  Array<std::uint16_t> own_point;    // per packed vertex that is not shared
-  std::vector<std::int32_t> home;    // per tile: its patch, kNowhere, or shared_home(n)
+  Array<std::uint16_t> own_point;  // per packed vertex that is not shared; kNothing where there is
+                                   // no vertex
+  std::vector<std::int32_t> home;  // per tile: its patch, kNowhere, or shared_home(n)
   std::vector<std::uint16_t> copy_point;
   std::vector<std::int32_t> copy_vertex;  // packed
   std::vector<std::uint16_t> hanging_point;

@@ -16,10 +16,12 @@ namespace kerf {
 class Workers {
  public:
   using Piece = std::function<void(int)>;
-  /// Calls piece(0) to piece(count - 1) in any order; what they throw is thrown by it.
+  /// Calls piece(0) to piece(count - 1) in any order. When one throws, others may be left out, and
+  /// it throws that.
   using Run = std::function<void(int count, const Piece& piece)>;
 
   Workers() = default;
+  /// Needs  threads > 0; `run`, unless there is but one.
   Workers(int threads, Run run) : threads_(threads), run_(std::move(run)) {}
 
   /// In how many parts so much work is shared out: none of them is hardly worth a thread.
@@ -45,7 +47,10 @@ class Workers {
     std::exception_ptr error[2];
     const auto piece = [&](int n) {
       try {
-        n == 0 ? aside() : here();
+        if (n == 0)
+          aside();
+        else
+          here();
       } catch (...) {
         error[n] = std::current_exception();
       }

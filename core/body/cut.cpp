@@ -107,26 +107,35 @@ struct NearLeaf {
   std::uint8_t mask = 0;
 };
 
+/// How far the material of finest cell `c` reaches along its link at face 2 axis + side, in cells
+/// from the centre: to the shared face, or to where the link was cut before.
+double reach_of(const LinkedOctree& body, const Vec3i& c, int face, bool* apart) {
+  Vec3i lower = c;
+  lower[static_cast<std::size_t>(face / 2)] += face % 2 - 1;
+  const LinkCut* record = body.record(lower, face / 2);
+  *apart = record != nullptr;
+  if (record == nullptr) return 0.5;
+  return record->end[1 - face % 2].distance / body.lattice().spacing + kSamePlace;
+}
+/// The same as a point of a finest leaf, for CellMap.
+Vec3d far_end(const LinkedOctree& body, const Vec3i& c, int face) {
+  bool apart = false;
+  Vec3d q{1, 1, 1};
+  q[face / 2] += 2 * (face % 2 == 1 ? 1 : -1) * reach_of(body, c, face, &apart);
+  return q;
+}
+
 /// Tests links of leaves; several of these may do so at once.
 class LinkTests {
  public:
-  LinkTests(const LinkedOctree& body, const Quantiser& quantiser)
-      : body_(body), quantiser_(quantiser) {}
+  /// Crossings go to `hits`.
+  LinkTests(const LinkedOctree& body, const Quantiser& quantiser, std::vector<Hit>& hits)
+      : body_(body), quantiser_(quantiser), hits_(hits) {}
 
   void test(const NearLeaf& leaf, const BladeTriangle& blade) {
     blade_ = &blade;
     mask_ = leaf.mask;
     test_cube(leaf.cell, {0, 0, 0}, leaf.cell.side, leaf.box);
-  }
-  std::vector<Hit>& hits() { return hits_; }
-
-  /// How far the material of finest cell `c` reaches along its link at face 2 axis + side, as a
-  /// point of a finest leaf, for CellMap.
-  Vec3d far_end(const Vec3i& c, int face) const {
-    bool apart = false;
-    Vec3d q{1, 1, 1};
-    q[face / 2] += 2 * (face % 2 == 1 ? 1 : -1) * reach(c, face, &apart);
-    return q;
   }
 
  private:
@@ -145,16 +154,6 @@ class LinkTests {
     }
   }
 
-  /// The same in cells from the centre: to the shared face, or to where the link was cut before.
-  double reach(const Vec3i& c, int face, bool* apart) const {
-    Vec3i lower = c;
-    lower[static_cast<std::size_t>(face / 2)] += face % 2 - 1;
-    const LinkCut* record = body_.record(lower, face / 2);
-    *apart = record != nullptr;
-    if (record == nullptr) return 0.5;
-    return record->end[1 - face % 2].distance / body_.lattice().spacing + kSamePlace;
-  }
-
   /// Tests the parts of the six links of finest cell `v` of a leaf that move with it.
   void test_finest(const CellMap& cell, const Vec3i& v) {
     const Lattice& lattice = body_.lattice();
@@ -167,7 +166,7 @@ class LinkTests {
       neighbour[static_cast<std::size_t>(axis)] += 2 * side - 1;
       lower[static_cast<std::size_t>(axis)] += side - 1;
       bool apart = false;
-      const double length = (mask_ >> face & 1) != 0 ? reach(c, face, &apart) : 0.5;
+      const double length = (mask_ >> face & 1) != 0 ? reach_of(body_, c, face, &apart) : 0.5;
       Vec3d far{1.0 * center[0], 1.0 * center[1], 1.0 * center[2]};
       far[axis] += (2 * side - 1) * 2 * length;
       double t = 0;
@@ -192,7 +191,7 @@ class LinkTests {
   const Quantiser& quantiser_;
   const BladeTriangle* blade_ = nullptr;  // the triangle at hand
   std::uint8_t mask_ = 0;                 // of the leaf at hand
-  std::vector<Hit> hits_;
+  std::vector<Hit>& hits_;
 };
 
 /// Finds the links that a blade crosses.
@@ -270,7 +269,6 @@ class LinkSearch {
 
   void look_at(std::int32_t number, const Vec3d* corners, const Box3& blade_box,
                Found& found) const {
-    LinkTests tests(body_, quantiser_);
     const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(number)];
     const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
     NearLeaf near{{&body_.lattice(), node.corner, 1 << node.size_log2, corners}, {}, 0};
@@ -279,12 +277,11 @@ class LinkSearch {
     // Parts of links that were cut may reach beyond the cell.
     for (int face = 0; face < 6; ++face)
       if ((near.mask >> face & 1) != 0)
-        near.box.add(near.cell.position_at(tests.far_end(node.corner, face)));
+        near.box.add(near.cell.position_at(far_end(body_, node.corner, face)));
     if (!near.box.overlaps(blade_box)) return;
     if (!are_few()) return found.near.push_back(near);
-    tests.hits().swap(found.hits);
+    LinkTests tests(body_, quantiser_, found.hits);
     for (const BladeTriangle& triangle : triangles_) tests.test(near, triangle);
-    tests.hits().swap(found.hits);
   }
 
   std::vector<Hit> search_tree(const std::vector<NearLeaf>& near) const {
@@ -293,13 +290,14 @@ class LinkSearch {
     for (const NearLeaf& leaf : near) boxes.push_back(leaf.box);
     const Bvh tree(std::move(boxes));
     std::vector<std::size_t> tested(near.size());  // the last triangle, from 1
-    LinkTests tests(body_, quantiser_);
+    std::vector<Hit> hits;
+    LinkTests tests(body_, quantiser_, hits);
     for (std::size_t n = 0; n < triangles_.size(); ++n)
       search(tree, triangles_[n].corners, [&](std::int32_t leaf) {
         const auto i = static_cast<std::size_t>(leaf);
         if (std::exchange(tested[i], n + 1) != n + 1) tests.test(near[i], triangles_[n]);
       });
-    return std::move(tests.hits());
+    return hits;
   }
 
   /// Queries the tree along a part of the triangle; parts are halved until their boxes are tight.

@@ -75,6 +75,14 @@ bool may_meet_opened(const Vec3d (&vertices)[8], const BladeReach& reach) {
   return reach.may_meet(box, true);
 }
 
+std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices) {
+  std::vector<double> out;
+  out.reserve(3 * vertices.size());
+  for (const std::int32_t v : vertices)
+    for (std::size_t d = 0; d < 3; ++d) out.push_back(all[3 * static_cast<std::size_t>(v) + d]);
+  return out;
+}
+
 void add_opened(std::span<const std::int32_t> opened, NearCells& out) {
   out.cells.insert(out.cells.end(), opened.begin(), opened.end());
   std::sort(out.cells.begin(), out.cells.end());

@@ -19,6 +19,9 @@ namespace kerf {
 void corner_values(const Level& level, std::int32_t cell, std::span<const double> vertex_values,
                    Vec3d (&out)[8]);
 
+/// Of a vector of all vertices, what it holds at some: three each.
+std::vector<double> values_at(std::span<const double> all, std::span<const std::int32_t> vertices);
+
 /// Where new vertices take their values from after a cut, so that the field stays what it was:
 /// vertex k of them is the sum of weight times source over [begin[k], begin[k + 1]).
 struct NewVertices {

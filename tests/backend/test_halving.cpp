@@ -28,8 +28,12 @@ Parts halved_box(int nx, int ny, int nz, std::size_t parts) {
   const Level level = box_level(nx, ny, nz);
   std::vector<std::int32_t> cells(level.corner.size());
   std::iota(cells.begin(), cells.end(), 0);
+  Parts out = cpu::halved(level, cells, parts);
+  for (const std::vector<std::int32_t>& part : out)
+    EXPECT_TRUE(std::is_sorted(part.begin(), part.end()));
   std::reverse(cells.begin(), cells.end());  // their order is nothing
-  return cpu::halved(level, cells, parts);
+  EXPECT_EQ(out, cpu::halved(level, cells, parts));
+  return out;
 }
 
 /// Cells along each axis of the box around a part.

@@ -15,9 +15,10 @@
 namespace kerf {
 namespace {
 
-// The nearest of several crossings of a link is taken, whichever worker found it. A blade of few
-// triangles, and one of many.
-TEST(Cut, IsTheSameForAnyNumberOfWorkers) {
+class CutByWorkers : public testing::TestWithParam<int> {};
+
+// A blade of few triangles, one of many, and again one of few beside where the first one was.
+TEST_P(CutByWorkers, IsTheSameForAnyNumber) {
   const Voxels voxels = test::box_body({22, 20, 21});
   const auto bend = [](const Vec3d& p) {
     return p + Vec3d{0.05 * std::sin(p.y), 0.04 * p.z * p.x, 0.03 * std::cos(3 * p.x)};
@@ -35,14 +36,16 @@ TEST(Cut, IsTheSameForAnyNumberOfWorkers) {
                          l.origin.x + 10 * l.spacing, l.origin.y + 9 * l.spacing, 6 * l.spacing,
                          l.origin.z - l.spacing, l.origin.z + 30 * l.spacing));
   const auto cut_by = [&](const Workers& workers, CutEvent(&events)[3]) {
-    LinkedOctree body(voxels, 0);
+    LinkedOctree body(voxels, GetParam());
     for (int n = 0; n < 3; ++n) {
       DeformedLeaves leaves;
       leaves.corners = test::corners_of(body, bend);
       for (const Vec3d& p : leaves.corners) leaves.bounds.add(p);
       leaves.numbers.resize(body.leaf_count());
       std::iota(leaves.numbers.begin(), leaves.numbers.end(), 0);
-      const TriangleMesh blade = n == 1 ? many : bent(few);
+      TriangleMesh blade = n == 1 ? many : bent(few);
+      if (n == 2)
+        for (Vec3d& p : blade.points) p.x -= 0.1 * l.spacing;
       events[n] = cut_near(body, leaves, blade, n + 1, workers);
     }
     return body;
@@ -51,6 +54,7 @@ TEST(Cut, IsTheSameForAnyNumberOfWorkers) {
   const LinkedOctree one = cut_by({}, expected);
   EXPECT_GT(expected[0].disconnected.size(), 500u);
   EXPECT_GT(expected[1].disconnected.size(), 300u);
+  EXPECT_GT(expected[2].moved.size(), 100u);
   for (const int threads : {2, 3, 8}) {
     SCOPED_TRACE(threads);
     CutEvent events[3];
@@ -58,6 +62,7 @@ TEST(Cut, IsTheSameForAnyNumberOfWorkers) {
     for (int n = 0; n < 3; ++n) {
       EXPECT_EQ(events[n].disconnected, expected[n].disconnected);
       EXPECT_EQ(events[n].moved, expected[n].moved);
+      EXPECT_EQ(events[n].split, expected[n].split);
       EXPECT_EQ(events[n].links_hit, expected[n].links_hit);
     }
     ASSERT_EQ(body.records().size(), one.records().size());
@@ -70,6 +75,9 @@ TEST(Cut, IsTheSameForAnyNumberOfWorkers) {
       }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Refinements, CutByWorkers, testing::Values(0, 1),
+                         testing::PrintToStringParamName());
 
 }  // namespace
 }  // namespace kerf
