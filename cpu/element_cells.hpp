@@ -66,18 +66,19 @@ struct TurnedCells {
 constexpr int kAnyMaterial = -1;
 constexpr std::size_t kMostNumbered = std::size_t{1} << 31;  // by 32 bits
 
-/// Rotations of some lanes (-1: any; needs a lane 0 with one). Those of one group lie behind those
-/// of the one before.
+/// Rotations of some lanes (-1: any; needs a lane 0 with one).
 template <class Cells, class S>
 void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat<Pack<S>>& out) {
   constexpr int kLanes = Pack<S>::kLanes;
 #if KERF_PACK_BITS == 512
   if constexpr (kLanes == kGroup) {
     // Children of cells side by side are mostly every other cell of two groups.
-    if (const int within = lanes[0] % kGroup; are_every_other(lanes) && within < 2) {
-      const S* const at = cells.rotation(static_cast<std::size_t>(lanes[0] - within));
+    if (const int within = lanes[0] % kGroup;
+        within < 2 && lanes[8] % kGroup == within && are_every_other(lanes)) {
+      const S* const low = cells.rotation(static_cast<std::size_t>(lanes[0] - within));
+      const S* const high = cells.rotation(static_cast<std::size_t>(lanes[8] - within));
       const auto component = [&](int c) {
-        return every_other(at + kGroup * c, at + kGroup * (c + 4), within);
+        return every_other(low + kGroup * c, high + kGroup * c, within);
       };
       out = {component(0), component(1), component(2), component(3)};
       return;

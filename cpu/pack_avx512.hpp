@@ -41,11 +41,13 @@ inline Pack<double> sqrt(const Pack<double>& a) {
 inline __m512i even_numbers() {
   return _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
 }
-/// Whether numbers, not negative, follow each other in steps of two.
+/// Whether each half of sixteen numbers, not negative, goes on in steps of two from its first.
 inline bool are_every_other(const std::int32_t* numbers) {
-  const __m512i expected = _mm512_add_epi32(_mm512_set1_epi32(numbers[0]), even_numbers());
-  return numbers[0] >= 0 &&
-         _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), expected) == 0xFFFF;
+  const __m512i first = _mm512_mask_set1_epi32(_mm512_set1_epi32(numbers[0]), 0xFF00, numbers[8]),
+                within = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 0, 2, 4, 6, 8, 10, 12, 14);
+  return numbers[0] >= 0 && numbers[8] >= 0 &&
+         _mm512_cmpeq_epi32_mask(_mm512_loadu_si512(numbers), _mm512_add_epi32(first, within)) ==
+             0xFFFF;
 }
 /// Every other of the scalars at `low` and then at `high`, from the first or the second one on.
 inline Pack<float> every_other(const float* low, const float* high, int first) {
