@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "core/near_leaves.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.hpp"

@@ -79,7 +79,7 @@ struct Simulation::Impl {
   void move_surface();
   void check_memory() const;
   CutEvent make_cut(const DueCut& due);
-  bool apply_cut(const DueCut& due, StepReport& report);
+  void apply_cut(const DueCut& due, StepReport& report);
   std::array<std::pair<int, bool>, 3> state_vectors() const;
   double natural_time() const;
   void copy_state(const StateVectors& from, const StateVectors& to);
@@ -259,14 +259,11 @@ CutEvent Simulation::Impl::make_cut(const DueCut& due) {
   return cut_near(body, leaves, due.blade, due.cut_id, backend->workers());
 }
 
-bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
+void Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
   const CutEvent event = make_cut(due);
   report.cuts.push_back(event);
   links_cut += event.disconnected.size();
-  if (!event.changed()) {
-    change_surface(event);
-    return false;
-  }
+  if (!event.changed()) return change_surface(event);
   check_memory();
   if (equilibrium) equilibrium->release();  // there is room for new patches then
   Kept kept;
@@ -280,7 +277,6 @@ bool Simulation::Impl::apply_cut(const DueCut& due, StepReport& report) {
                           });
   for (std::string& warning : structure->take_warnings()) warnings.push_back(std::move(warning));
   follow_structure(in_place, std::move(kept));
-  return true;
 }
 
 // Vectors of the state, and whether they hold a displacement.

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <type_traits>
 #include <vector>
 
@@ -60,32 +59,6 @@ Box3 before_rounding(const PlaceBox<RoundedPlace>& rounded) {
   return box;
 }
 
-/// As PlaceBox, of sixteen places at a time: one in each lane.
-class TileBox {
- public:
-  TileBox() {
-    for (int c = 0; c < 3; ++c) {
-      std::fill_n(lo_[c], kGroup, kFar);
-      std::fill_n(hi_[c], kGroup, -kFar);
-    }
-  }
-  void add(const double (&p)[3][kGroup]) {
-    for (int c = 0; c < 3; ++c)
-      for (int k = 0; k < kGroup; ++k) {
-        lo_[c][k] = p[c][k] < lo_[c][k] ? p[c][k] : lo_[c][k];
-        hi_[c][k] = p[c][k] > hi_[c][k] ? p[c][k] : hi_[c][k];
-      }
-  }
-  void add_to(PlaceBox<Place>& box) const {
-    for (int k = 0; k < kGroup; ++k)
-      box.add(Place{lo_[0][k], lo_[1][k], lo_[2][k], 0}, Place{hi_[0][k], hi_[1][k], hi_[2][k], 0});
-  }
-
- private:
-  static constexpr double kFar = std::numeric_limits<double>::infinity();
-  double lo_[3][kGroup], hi_[3][kGroup];
-};
-
 class NearPatches {
  public:
   NearPatches(const PatchedLevel& level, double spacing, std::span<const double> displacement,
@@ -96,19 +69,21 @@ class NearPatches {
   void look(const Patch& patch, std::vector<RoundedPlace>& at, NearCells& out) const {
     constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
     at.resize(static_cast<std::size_t>(patch.points));
+    Place sum{};  // finite as long as all are
     PlaceBox<Place> bounds;
-    TileBox of_tiles;
-    double none[kGroup] = {};  // zero as long as all are finite
-    for (std::int32_t v = patch.own.first; v < patch.own.end(); v += kGroup)
-      look_at_tile(v, at.data(), of_tiles, none);
-    of_tiles.add_to(bounds);
-    for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k) {
-      const Place p = position(level_.copy_vertex[k]);
+    const auto add = [&](std::int32_t packed, std::uint16_t point) {
+      const Place p = position(packed);
       bounds.add(p);
-      none[0] += 0 * (p[0] + p[1] + p[2]);
-      at[level_.copy_point[k]] = __builtin_convertvector(p, RoundedPlace);
+      sum += 0 * p;
+      at[point] = __builtin_convertvector(p, RoundedPlace);
+    };
+    for (std::int32_t v = patch.own.first; v < patch.own.end(); ++v) {
+      prefetch_place(std::min(v + kAhead, patch.own.end() - 1));
+      if (level_.vertex[v] >= 0) add(v, level_.own_point[v]);
     }
-    out.finite = std::accumulate(std::begin(none), std::end(none), 0.0) == 0;
+    for (std::int32_t k = patch.copies.first; k < patch.copies.end(); ++k)
+      add(level_.copy_vertex[k], level_.copy_point[k]);
+    out.finite = std::isfinite(sum[0] + sum[1] + sum[2]);
     out.bounds = bounds.box();
     if (!reach_.may_meet(out.bounds, false)) return;
     if (!fits_single(out.bounds)) return add_all(patch, out);
@@ -128,6 +103,7 @@ class NearPatches {
   }
 
  private:
+  static constexpr std::int32_t kAhead = 32;
   static constexpr std::size_t kTogether = 8;
 
   static bool fits_single(const Box3& box) {
@@ -141,33 +117,10 @@ class NearPatches {
                  [](std::int32_t c) { return c >= 0; });
   }
 
-  /// The own vertices from `first` on. What a tile has no vertex for is not a number, and so in no
-  /// box.
-  void look_at_tile(std::int32_t first, RoundedPlace* at, TileBox& box,
-                    double (&none)[kGroup]) const {
-    constexpr std::size_t kAhead = 3;
-    const auto begin = static_cast<std::size_t>(first);
-    const std::int32_t* const vertex = level_.vertex.data() + begin;
-    const double* const u = displacement_.data() + scalar_of(first);
-    prefetch(u, kAhead * kTileScalars, kTileScalars);
-    const Vec3i* const points = level_.level->point.data();
-    std::int32_t rest[3][kGroup];
-    for (int k = 0; k < kGroup; ++k) {
-      const Vec3i& point = points[std::max(vertex[k], 0)];
-      rest[0][k] = point[0], rest[1][k] = point[1], rest[2][k] = point[2];
-    }
-    double p[3][kGroup];
-    for (int c = 0; c < 3; ++c)
-      for (int k = 0; k < kGroup; ++k) {
-        const double of = u[kGroup * c + k], place = rest[c][k] * spacing_ + of;
-        none[k] += 0 * of;
-        p[c][k] = vertex[k] < 0 ? std::numeric_limits<double>::quiet_NaN() : place;
-      }
-    box.add(p);
-    const std::uint16_t* const point = level_.own_point.data() + begin;
-    for (int k = 0; k < kGroup; ++k)
-      at[point[k]] = RoundedPlace{static_cast<float>(p[0][k]), static_cast<float>(p[1][k]),
-                                  static_cast<float>(p[2][k]), 0};
+  /// Vertices of a patch are numbered anew, and their places lie anywhere.
+  void prefetch_place(std::int32_t packed) const {
+    const std::int32_t vertex = level_.vertex[packed];
+    if (vertex >= 0) prefetch(level_.level->point.data(), static_cast<std::size_t>(vertex), 1);
   }
   Place position(std::int32_t packed) const {
     const double* u = displacement_.data() + scalar_of(packed);

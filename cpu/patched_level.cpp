@@ -227,11 +227,12 @@ class Patcher {
     });
   }
 
-  /// body(i) for i below `count`, on all threads.
+  static constexpr std::size_t kChunk = 512;
+  static std::size_t chunks_of(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+  /// body(i) for i below `count`, on all threads; those of one chunk by one of them.
   template <class Body>
   void in_chunks(std::size_t count, const Body& body) const {
-    constexpr std::size_t kChunk = 512;
-    for_patches(0, size_of((count + kChunk - 1) / kChunk), threads_, [&](std::int32_t chunk) {
+    for_patches(0, size_of(chunks_of(count)), threads_, [&](std::int32_t chunk) {
       const std::size_t first = kChunk * static_cast<std::size_t>(chunk);
       for (std::size_t i = first; i < std::min(first + kChunk, count); ++i) body(i);
     });
@@ -241,15 +242,21 @@ class Patcher {
 
   /// Cells that change with vertices or with cells below, ascending.
   std::vector<std::int32_t> cells_beside(const PatchMoves* below) {
-    std::vector<char> met(level_.corner.size());
-    in_chunks(change_->vertices.size(),
-              [&](std::size_t i) { mark_vertex(change_->vertices[i], met); });
-    if (below != nullptr)
-      for (const std::int32_t child : below->held) met[finer_->level->parent[child]] = 1;
+    const std::vector<std::int32_t>& vertices = change_->vertices;
+    std::vector<std::vector<std::int32_t>> found(chunks_of(vertices.size()));
+    Marks met(level_.corner.size());
+    in_chunks(vertices.size(),
+              [&](std::size_t i) { mark_vertex(vertices[i], met, found[i / kChunk]); });
     std::vector<std::int32_t> out;
-    for (auto at = met.begin(); (at = std::find(at, met.end(), 1)) != met.end(); ++at)
-      out.push_back(size_of(static_cast<std::size_t>(at - met.begin())));
+    for (const auto& some : found) out.insert(out.end(), some.begin(), some.end());
+    if (below != nullptr)
+      for (const std::int32_t child : below->held) meet(finer_->level->parent[child], met, out);
+    std::sort(out.begin(), out.end());
     return out;
+  }
+  /// Adds a cell to a list unless some thread has added it to one.
+  static void meet(std::int32_t c, Marks& met, std::vector<std::int32_t>& list) {
+    if (std::atomic_ref(met[c]).exchange(1, std::memory_order_relaxed) == 0) list.push_back(c);
   }
 
   /// The vertices of a cell may take other values.
@@ -262,14 +269,14 @@ class Patcher {
   }
 
   /// The row of a vertex is that of its first cell, which may be another now.
-  void mark_vertex(std::int32_t v, std::vector<char>& met) {
+  void mark_vertex(std::int32_t v, Marks& met, std::vector<std::int32_t>& beside) {
     const bool is_fresh = v >= change_->vertices_before;
     const bool held_otherwise = !is_fresh && out_.fixed[out_.packed[v]] != level_.fixed[v];
     const bool may_be_loose = finer_ != nullptr && finer_->children.empty();
     touch_tile(v);
     for (const std::int32_t item : level_.incidences_of(v)) {
       raise(works_[patch_of(item / 8)].transfers);
-      if (held_otherwise || may_be_loose) raise(met[item / 8]);
+      if (held_otherwise || may_be_loose) meet(item / 8, met, beside);
     }
   }
 

@@ -40,8 +40,9 @@ class Workers {
     });
   }
   /// Runs `aside` and `here` at once; without threads one after the other. Both have ended when
-  /// this does, and what they throw is thrown by it: that of `here` if both do. Needs  that neither
-  /// writes what the other reads.
+  /// this does, and what they throw is thrown by it: that of `here` if both do.
+  ///
+  /// Needs  that neither writes what the other reads.
   template <class Aside, class Here>
   void both(const Aside& aside, const Here& here) const {
     std::exception_ptr error[2];

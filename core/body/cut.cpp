@@ -17,6 +17,8 @@ namespace kerf {
 namespace {
 
 constexpr double kMaxBladeRatio = 1e6;
+/// A blade of so few triangles is looked at closely wherever something may meet it.
+constexpr std::size_t kFewTriangles = 16;
 
 /// A crossing of one part of a link.
 struct Hit {
@@ -262,10 +264,7 @@ class LinkSearch {
   }
 
   /// Each leaf is tested against each of a few triangles; of many, only against those near it.
-  bool are_few() const {
-    constexpr std::size_t kFew = 16;
-    return triangles_.size() <= kFew;
-  }
+  bool are_few() const { return triangles_.size() <= kFewTriangles; }
 
   void look_at(std::int32_t number, const Vec3d* corners, const Box3& blade_box,
                Found& found) const {
@@ -447,12 +446,12 @@ CutEvent begin_event(const LinkedOctree& body, std::int32_t cut_id) {
 
 BladeReach::BladeReach(const TriangleMesh& blade, const Vec3d& origin) {
   constexpr double kRounding = 1e-10;  // the integers of a blade are 2^40 to some times its size
-  constexpr std::size_t kFew = 16;
   box_ = bounds_of(blade);
   margin_ = kRounding * (largest(box_.extent()) + largest(box_.lo) + largest(box_.hi));
   inflate(box_, margin_);
   box_ = {box_.lo - origin, box_.hi - origin};
-  for (std::size_t t = 0; t < blade.triangles.size() && blade.triangles.size() <= kFew; ++t) {
+  for (std::size_t t = 0; t < blade.triangles.size() && blade.triangles.size() <= kFewTriangles;
+       ++t) {
     Vec3d p[3];
     Slab slab;
     for (std::size_t i = 0; i < 3; ++i) {
