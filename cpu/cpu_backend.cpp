@@ -355,7 +355,10 @@ void CpuBackend::elastic_force(int displacement, int out) {
 
 void CpuBackend::move_points(std::span<const BoundPoint> points, int displacement,
                              std::span<Vec3d> positions) {
-  cpu::move_points(*levels_[0].level, points, data(0, displacement), positions, threads_);
+  const double* u = data(0, displacement);
+  cpu::move_points(
+      *levels_[0].level, points, [&](std::int32_t v) { return cpu::load(u, v); }, positions,
+      threads_);
 }
 
 void CpuBackend::surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,

@@ -81,7 +81,7 @@ void FastBackend<S>::chebyshev_step(int level, const Value& value, double step, 
       [&](std::size_t group, const S* x, S* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const V& sum, const auto& before) {
         const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
-        store_tile(u, tile, first, before() + Pack<S>(by) * l.times_inverse(tile, first, r));
+        store_tile(u, tile, first, before() + Pack<S>(by) * l.inverse.times(tile, first, r));
         return Sums{};
       });
 }
@@ -102,7 +102,7 @@ void FastBackend<S>::chebyshev(int level) {
   const S* f = l.at(kRight);
   const auto first_step = static_cast<S>(steps[0]);
   const auto from_zero = [&](std::size_t tile, int first) {
-    return Pack<S>(first_step) * l.times_inverse(tile, first, load_tile(f, tile, first));
+    return Pack<S>(first_step) * l.inverse.times(tile, first, load_tile(f, tile, first));
   };
   const auto corrected = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first) +
@@ -145,14 +145,14 @@ void FastBackend<S>::restrict_vector(int fine, int x) {
     TransferPoints<S> points(from.patched, patch);
     points.clear(given);
     points.give_own(r, given);
-    points.give_leads(r, given);
+    points.give_leads(r, scalar_of, given);
   });
   sum_given(fine, given);
 }
 
 // What own vertices have left goes to the next level while it is in registers, and to no vector;
-// that of shared ones has to wait for all patches. In the order of restrict_residual: the same
-// bits.
+// that of shared ones has to wait for all patches, tile by tile behind what is given. In the order
+// of restrict_residual: the same bits.
 template <class S>
 void FastBackend<S>::restrict_from_solution(int fine) {
   settle();
@@ -160,9 +160,12 @@ void FastBackend<S>::restrict_from_solution(int fine) {
   if (l.solution_is_zero) return restrict_vector(fine, kRight);
   const S* f = l.at(kRight);
   const S* u = l.at(kSolution);
-  S* r = l.at(kResidual);
-  const std::size_t copies = 4 * l.patched.copy_point.size();
-  S* const given = partial_sums<S>(copies + 4 * l.patched.transfer.point.size()) + copies;
+  const PatchedLevel& packed = l.patched;
+  const std::size_t copies = 4 * packed.copy_point.size(), gives = 4 * packed.transfer.point.size();
+  S* const given =
+      partial_sums<S>(copies + gives + kTileScalars * packed.shared_tiles.size()) + copies;
+  S* const shared = given + gives;
+  const auto place = [&](std::int32_t v) { return scalar_of(packed.shared_number(v)); };
   const auto left = [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum) {
     return load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
   };
@@ -180,11 +183,14 @@ void FastBackend<S>::restrict_from_solution(int fine) {
         return Sums{};
       },
       [&](std::size_t tile, int first, const Vec3<Pack<S>>& sum, const auto&) {
-        store_tile(r, tile, first, left(tile, first, sum));
+        const auto number = packed.shared_number(kGroup * static_cast<std::int32_t>(tile));
+        store_tile(shared, static_cast<std::size_t>(number / kGroup), first,
+                   left(tile, first, sum));
         return Sums{};
       });
-  for_patches_of(
-      fine, [&](std::size_t patch) { TransferPoints<S>(l.patched, patch).give_leads(r, given); });
+  for_patches_of(fine, [&](std::size_t patch) {
+    TransferPoints<S>(packed, patch).give_leads(static_cast<const S*>(shared), place, given);
+  });
   sum_given(fine, given);
 }
 
@@ -279,7 +285,7 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
       for_packs<S>([&](int first) {
         store_tile_as(to, tile, first,
-                      l.times_inverse(tile, first, load_tile_as<S>(from, tile, first)));
+                      l.inverse.times(tile, first, load_tile_as<S>(from, tile, first)));
       });
     });
   });
@@ -288,9 +294,16 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
 template <class S>
 void FastBackend<S>::move_points(std::span<const BoundPoint> points, int displacement,
                                  std::span<Vec3d> positions) {
-  displacements_.resize(3 * levels_[0].patched.packed.size());
-  read(0, displacement, displacements_);
-  cpu::move_points(*levels_[0].patched.level, points, displacements_.data(), positions, threads_);
+  settle();
+  const FastLevel<S>& l = levels_[0];
+  FastVector& u = levels_[0].vectors[static_cast<std::size_t>(displacement)];
+  with_types(u, u, [&](const auto* from, const auto*) {
+    const auto at = [&](std::int32_t v) {
+      const auto* const x = from + scalar_of(l.patched.packed[v]);
+      return Vec3<double>{double(x[0]), double(x[kGroup]), double(x[2 * kGroup])};
+    };
+    cpu::move_points(*l.patched.level, points, at, positions, threads_);
+  });
 }
 
 template <class S>

@@ -21,6 +21,7 @@
 #include "cpu/finest_values.hpp"
 #include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
+#include "cpu/inverse_diagonals.hpp"
 #include "cpu/parallel_errors.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/transfer_points.hpp"
@@ -116,7 +117,7 @@ template <class S>
 struct FastLevel {
   PatchedLevel patched;
   StoredMatrices<S> matrices;  // levels above 0
-  Array<S> inverse_diagonal;   // [tile][xx xy xz yy yz zz][kGroup]
+  InverseDiagonals<S> inverse;  // of diagonal blocks
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
@@ -127,16 +128,6 @@ struct FastLevel {
     return patched.fixed.data() + kGroup * tile + first;
   }
   S* at(int x) { return vectors[static_cast<std::size_t>(x)].template in<S>().data(); }
-
-  /// D^-1 r of the vertices of a tile.
-  Vec3<Pack<S>> times_inverse(std::size_t tile, int first, const Vec3<Pack<S>>& r) const {
-    if (first == 0) prefetch_tile(inverse_diagonal.data(), tile, 6);
-    const S* d = inverse_diagonal.data() + 2 * kTileScalars * tile + first;
-    const auto entry = [&](int e) { return load_pack(d + kGroup * e); };
-    const Pack<S> xy = entry(1), xz = entry(2), yz = entry(4);
-    return {fma(entry(0), r.x, fma(xy, r.y, xz * r.z)), fma(xy, r.x, fma(entry(3), r.y, yz * r.z)),
-            fma(xz, r.x, fma(yz, r.y, entry(5) * r.z))};
-  }
 };
 
 /// S: scalar of the cycle, and of the vectors of conjugate gradients. Those that are added on level
@@ -346,7 +337,6 @@ class FastBackend final : public Backend {
   Array<double> partial_;     // sums of shared vertices, by copy; of the scalars of the sweep
   int waiting_ = -1;          // level whose solution is still to be corrected
   std::vector<Vec3d> faces_;  // of the surface: area normals
-  std::vector<double> displacements_;  // of the vertices of level 0, for the surface
   std::unique_ptr<AssembledLevel> coarsest_;
   FrontFactor<S> coarsest_factor_;
   bool factored_ = false;

@@ -204,12 +204,10 @@ void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S
   P keep[3];
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
-  const auto inverse = kernels::inverse_semidefinite(
-      kernels::Sym3<P>{keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
-                       keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z});
-  S* to = l.inverse_diagonal.data() + 2 * kTileScalars * tile + first;
-  const P entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
-  for (int e = 0; e < 6; ++e) store_pack(to + kGroup * e, entries[e]);
+  l.inverse.store(tile, first,
+                  kernels::inverse_semidefinite(kernels::Sym3<P>{
+                      keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+                      keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z}));
 }
 
 template <class S>
@@ -268,7 +266,7 @@ void FastBackend<S>::prepare(int level) {
   });
   if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size())) {
     l.bound = estimate_spectral_bound(*this, level, *packed.level);
-    l.vectors.release(kDirection);  // nothing else here asks for it
+    for (const int x : {kDirection, kResidual}) l.vectors.release(x);  // a cycle asks for neither
   }
 }
 

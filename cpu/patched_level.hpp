@@ -33,10 +33,10 @@
 
 namespace kerf::cpu {
 
-/// What an array holds, with the room that is reserved.
+/// What an array holds. Room at its end that was never written takes no memory.
 template <class T, class Allocator>
 std::size_t bytes_of(const std::vector<T, Allocator>& array) {
-  return array.capacity() * sizeof(T);
+  return array.size() * sizeof(T);
 }
 
 /// Cells of a group and vertices of a tile: those of the widest pack.

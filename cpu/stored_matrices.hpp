@@ -20,6 +20,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "cpu/codes.hpp"
 #include "cpu/lane_picker.hpp"
 #include "cpu/patched_level.hpp"
 #include "kernels/mode_coarsen.hpp"
@@ -39,36 +40,6 @@ void store_quaternion(S* to, const kernels::Quat<Pack<S>>& q) {
   store_pack(to + kGroup, q.x);
   store_pack(to + 2 * kGroup, q.y);
   store_pack(to + 3 * kGroup, q.z);
-}
-
-/// Integers as scalars.
-inline Pack<float> widened(const std::int16_t* from) {
-#if KERF_PACK_BITS == 512
-  const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
-  return Pack<float>::Vector(_mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(codes)));
-#elif KERF_PACK_BITS == 256
-  const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
-  return Pack<float>::Vector(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(codes)));
-#else
-  Pack<float> out;
-  for (int k = 0; k < Pack<float>::kLanes; ++k) out.set(k, static_cast<float>(from[k]));
-  return out;
-#endif
-}
-
-/// The nearest integers, even ones in the middle.
-inline void store_narrowed(std::int16_t* to, const Pack<float>& x) {
-#if KERF_PACK_BITS == 512
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to),
-                      _mm512_cvtsepi32_epi16(_mm512_cvtps_epi32(__m512(x.v))));
-#elif KERF_PACK_BITS == 256
-  const __m256i codes = _mm256_cvtps_epi32(__m256(x.v));
-  _mm_storeu_si128(
-      reinterpret_cast<__m128i*>(to),
-      _mm_packs_epi32(_mm256_castsi256_si128(codes), _mm256_extracti128_si256(codes, 1)));
-#else
-  for (int k = 0; k < Pack<float>::kLanes; ++k) to[k] = static_cast<std::int16_t>(std::lrint(x[k]));
-#endif
 }
 
 /// Entries of a group as packs. Each read asks memory for what lies a group or somewhat more ahead:

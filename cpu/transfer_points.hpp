@@ -85,11 +85,13 @@ class TransferPoints {
       for_packs<S>([&](int first) { give_tile(tile, first, load_tile(r, tile, first), out); });
     }
   }
-  void give_leads(const S* r, S* out) {
+  /// place(packed vertex): where it lies in r.
+  template <class Place>
+  void give_leads(const S* r, const Place& place, S* out) {
     for_lead_blocks([&](const TransferBlock& block, std::int32_t first, int count) {
       S* row = rows_;
       for (int k = 0; k < count; ++k, row += 4) {
-        const S* from = r + scalar_of(transfer_.lead[first + k]);
+        const S* from = r + place(transfer_.lead[first + k]);
         row[0] = from[0], row[1] = from[kGroup], row[2] = from[2 * kGroup], row[3] = 0;
       }
       give(block, transfer_.lead_others.data() + first, given_to(out));

@@ -14,6 +14,7 @@
 
 #include "cpu/element_cells.hpp"
 #include "cpu/finest_values.hpp"
+#include "cpu/inverse_diagonals.hpp"
 #include "cpu/patch_sweep.hpp"
 #include "cpu/patched_level.hpp"
 #include "cpu/stored_matrices.hpp"
@@ -265,6 +266,113 @@ TEST(Codes, ComeBackAsTheNearestIntegers) {
   EXPECT_EQ(back[1], -32767);
   EXPECT_EQ(back[2], 2);
   for (int k = 3; k < kLanes; ++k) EXPECT_EQ(back[k], 1000.0F * static_cast<float>(k - 4));
+}
+
+TEST(Codes, UpperHalvesComeBackAndAreNotBelow) {
+  constexpr int kLanes = Pack<float>::kLanes;
+  Pack<float> x;
+  for (int k = 0; k < kLanes; ++k) x.set(k, std::ldexp(1.0F + 0.0037F * float(k), 11 * k - 60));
+  x.set(0, std::numeric_limits<float>::min());
+  x.set(1, 0x1p100F);
+  std::array<std::int16_t, kLanes> halves;
+
+  const Pack<float> up = cpu::rounded_up(x);
+  cpu::store_upper(halves.data(), up);
+  const Pack<float> back = cpu::load_upper(halves.data());
+
+  EXPECT_EQ(back[0], x[0]);
+  EXPECT_EQ(back[1], x[1]);
+  for (int k = 0; k < kLanes; ++k) {
+    EXPECT_EQ(back[k], up[k]) << k;
+    EXPECT_GE(back[k], x[k]) << k;
+    EXPECT_LE(back[k], (1 + 0x1p-7F) * x[k]) << k;
+  }
+}
+
+/// Symmetric matrices of the lanes of a tile: entries in the order of kernels::Sym3.
+using TileBlocks = std::array<std::array<double, 6>, cpu::kGroup>;
+
+template <class S>
+cpu::InverseDiagonals<S> inverse_diagonals_of(const std::vector<TileBlocks>& tiles) {
+  cpu::InverseDiagonals<S> out;
+  out.assign(tiles.size(), false);
+  for (std::size_t t = 0; t < tiles.size(); ++t)
+    for (int first = 0; first < cpu::kGroup; first += Pack<S>::kLanes) {
+      Pack<S> e[6];
+      for (int i = 0; i < 6; ++i)
+        for (int k = 0; k < Pack<S>::kLanes; ++k)
+          e[i].set(k, static_cast<S>(tiles[t][first + k][i]));
+      out.store(t, first, {e[0], e[1], e[2], e[3], e[4], e[5]});
+    }
+  return out;
+}
+
+/// Q diag(1, 1 / sqrt(condition), 1 / condition) Q^T in some frame, times `size`.
+std::array<double, 6> block_of(std::uint64_t n, double condition, double size) {
+  std::array<double, 4> q;
+  double norm = 0;
+  for (std::size_t c = 0; c < 4; ++c) q[c] = kernels::noise(4 * n + c), norm += q[c] * q[c];
+  for (double& c : q) c /= std::sqrt(norm);
+  const kernels::Mat3<double> R = kernels::to_matrix(kernels::Quat<double>{q[0], q[1], q[2], q[3]});
+  const double d[] = {size, size / std::sqrt(condition), size / condition};
+  const auto entry = [&](int i, int j) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) sum += R[i][k] * d[k] * R[j][k];
+    return sum;
+  };
+  return {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)};
+}
+
+template <class S>
+class InverseDiagonals : public ::testing::Test {};
+TYPED_TEST_SUITE(InverseDiagonals, Scalars);
+
+// Blocks of all sizes and conditions side by side: those of a soft cell are as good as those of a
+// stiff one in the same tile. Products with each unit vector are the columns of what is stored.
+TYPED_TEST(InverseDiagonals, AreWithinTheirBoundOfWhatWasStoredAndDefinite) {
+  using S = TypeParam;
+  constexpr bool kIsSingle = std::is_same_v<S, float>;
+  const double bound = kIsSingle ? 1.6e-5 : 1e-15;
+  std::vector<TileBlocks> tiles(6);
+  for (std::size_t n = 0; n < cpu::kGroup * tiles.size(); ++n)
+    tiles[n / cpu::kGroup][n % cpu::kGroup] =
+        block_of(n, std::pow(1.5e4, double(n % 5) / 4), std::pow(10.0, 3.0 * double(n % 11) - 20));
+  tiles[2][5] = {};                              // wholly held
+  tiles[2][6] = {0, 0, 0, 4e-9, 0, 0};           // in two components
+  tiles[3][1] = {1e-36, 0, 0, 1e-36, 0, 1e-36};  // as good as nothing
+  const cpu::InverseDiagonals<S> all = inverse_diagonals_of<S>(tiles);
+  constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  for (std::size_t n = 0; n < cpu::kGroup * tiles.size(); ++n) {
+    SCOPED_TRACE(n);
+    const std::size_t tile = n / cpu::kGroup;
+    const int lane = int(n % cpu::kGroup), k = lane % Pack<S>::kLanes;
+    const std::array<double, 6>& in = tiles[tile][lane];
+    double out[3][3], greatest = 0;
+    for (const double e : in) greatest = std::max(greatest, std::abs(e));
+    for (int j = 0; j < 3; ++j) {
+      Vec3<Pack<S>> unit{Pack<S>(0), Pack<S>(0), Pack<S>(0)};
+      unit[j].set(k, 1);
+      const auto column = all.times(tile, lane - k, unit);
+      for (int i = 0; i < 3; ++i) out[i][j] = static_cast<double>(column[i][k]);
+    }
+    const double off = std::max(bound * greatest, kIsSingle ? 1e-37 : 0.0);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        EXPECT_NEAR(out[i][j], in[kEntry[i][j]], off);
+        EXPECT_EQ(out[i][j], out[j][i]);
+        if (in[kEntry[i][j]] == 0) {
+          EXPECT_EQ(out[i][j], 0);
+        }
+      }
+    if (n % cpu::kGroup > 6 || tile > 3) {
+      kernels::Mat3<double> m;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m[i][j] = out[i][j] / greatest;
+      EXPECT_GT(m[0][0], 0);
+      EXPECT_GT(m[0][0] * m[1][1] - m[0][1] * m[1][0], 0);
+      EXPECT_GT(kernels::determinant(m), 0);
+    }
+  }
 }
 
 TEST(Lanes, GoToOtherLanesAndLeaveTheRest) {
