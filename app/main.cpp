@@ -3,6 +3,7 @@
 
 #include "app/commands.hpp"
 #include "app/version.hpp"
+#include "core/base/memory.hpp"
 
 namespace {
 
@@ -40,6 +41,7 @@ CLI::App* add_render(CLI::App& app, kerf::RenderOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  kerf::return_large_blocks_when_freed();
   CLI::App app{"Kerf simulates cuts in deformable bodies."};
   app.name("kerf");
   app.require_subcommand(1);

@@ -76,18 +76,20 @@ void FastBackend<S>::load_coarsest() {
 template <class S>
 void FastBackend<S>::load(const Hierarchy& hierarchy) {
   hierarchy_ = &hierarchy;
+  const bool follows = updates_ && hierarchy.has_neighbours();
   waiting_ = -1;
   levels_.resize(hierarchy.levels.size());
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
     level.patched =
         make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
+    if (!follows) level.patched.forget_rows();
     level.bound = 0;
     level.solution_is_zero = false;
     const std::size_t scalars = kTileScalars * level.patched.tiles();
-    level.inverse.assign(level.patched.tiles(), updates_);
+    level.inverse.assign(level.patched.tiles(), follows);
     level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
-                         scalars, updates_);
+                         scalars, follows);
   }
   folds_ = SlotTable<S>(hierarchy.lumped_mass ? kernels::MassModel::lumped
                                               : kernels::MassModel::consistent);

@@ -70,8 +70,8 @@ void for_corners(const PatchedLevel& level, std::size_t group, const Body& body)
   const auto run = [&](auto kind) {
     constexpr bool in_rows = run_of(kind()) > 1;
     constexpr std::size_t kPoints = in_rows ? kHeads : 8 * kGroup, kAhead = in_rows ? 16 : 4;
-    const auto& all = in_rows ? level.heads : level.corners;
-    const std::uint16_t* const points = all.data() + kPoints * group;
+    const std::uint16_t* const points =
+        in_rows ? level.heads.data() + kHeads * group : level.corners_of(group);
     prefetch(points, kPoints * kAhead, kPoints);
     for_packs<S>([&](int first) { body(points + (in_rows ? first / 4 : first), kind, first); });
   };

@@ -135,7 +135,7 @@ class NearPatches {
 
   const std::uint16_t* slots_of(std::size_t g) const {
     return level_.folded(g) ? level_.slots.data() + 8 * kGroup * std::size_t(level_.slots_at[g])
-                            : level_.corners.data() + 8 * kGroup * g;
+                            : level_.corners_of(g);
   }
   /// Of the points of the slots of a group.
   PlaceBox<RoundedPlace> box_of(std::size_t g, const RoundedPlace* at) const {

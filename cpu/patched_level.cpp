@@ -537,6 +537,22 @@ void PatchedLevel::set_heads(std::size_t group) {
           corners[8 * kGroup * group + 2 * kGroup * edge + kGroup / 4 * quarter];
 }
 
+void PatchedLevel::forget_rows() {
+  constexpr std::size_t kBlock = 8 * kGroup;
+  const auto in_rows = [](std::uint8_t as) { return run_of(static_cast<RowKind>(as)) > 1; };
+  const auto others =
+      groups() - static_cast<std::size_t>(std::count_if(row.begin(), row.end(), in_rows));
+  Array<std::uint16_t> kept;
+  kept.reserve(kBlock * others);
+  corners_at.assign(groups(), -1);
+  for (std::size_t g = 0; g < groups(); ++g) {
+    if (in_rows(row[g])) continue;
+    corners_at[g] = size_of(kept.size() / kBlock);
+    kept.insert(kept.end(), corners.data() + kBlock * g, corners.data() + kBlock * (g + 1));
+  }
+  corners = std::move(kept);
+}
+
 void PatchedLevel::empty_group(std::int32_t g) {
   std::fill_n(cell.begin() + kGroup * g, kGroup, -1);
   if (!children.empty())
@@ -562,17 +578,19 @@ void Range::grow(std::size_t count, bool spare, std::int32_t& end) {
 
 std::size_t PatchedLevel::bytes() const {
   return bytes_of(patches) + bytes_of(kinds) + bytes_of(cell) + bytes_of(lane) + bytes_of(corners) +
-         bytes_of(heads) + bytes_of(kind) + bytes_of(row) + bytes_of(slots_at) +
-         bytes_of(patch_of) + bytes_of(slots) + bytes_of(vertex) + bytes_of(packed) +
-         bytes_of(fixed) + bytes_of(own_point) + bytes_of(home) + bytes_of(copy_point) +
-         bytes_of(copy_vertex) + bytes_of(hanging_point) + bytes_of(hanging_masters) +
-         bytes_of(shared_tiles) + bytes_of(copies_begin) + bytes_of(copies_of) +
-         bytes_of(copy_rows.count) + transfer.bytes() + bytes_of(held) + bytes_of(children);
+         bytes_of(corners_at) + bytes_of(heads) + bytes_of(kind) + bytes_of(row) +
+         bytes_of(slots_at) + bytes_of(patch_of) + bytes_of(slots) + bytes_of(vertex) +
+         bytes_of(packed) + bytes_of(fixed) + bytes_of(own_point) + bytes_of(home) +
+         bytes_of(copy_point) + bytes_of(copy_vertex) + bytes_of(hanging_point) +
+         bytes_of(hanging_masters) + bytes_of(shared_tiles) + bytes_of(copies_begin) +
+         bytes_of(copies_of) + bytes_of(copy_rows.count) + transfer.bytes() + bytes_of(held) +
+         bytes_of(children);
 }
 
 PatchMoves update_patches(const Hierarchy& hierarchy, const HierarchyChange& change,
                           std::size_t index, const PatchedLevel* finer, const PatchMoves* below,
                           int threads, PatchedLevel& level) {
+  ensures(level.corners_at.empty(), "a level that forgot its rows is asked to follow a cut");
   if (level.groups() > 2 * level.groups_built || level.tiles() > 2 * level.tiles_built)
     return remake_patches(hierarchy, change.levels[index], index, finer, threads, level);
   return Patcher(hierarchy, index, finer, threads, level).update(change, below);

@@ -213,16 +213,18 @@ struct PatchedLevel {
   std::vector<Patch> patches;
   std::vector<CellKind> kinds;  // level 0
 
-  std::vector<std::int32_t> cell;      // per lane, -1: none
-  std::vector<std::int32_t> lane;      // per cell
-  Array<std::uint16_t> corners;        // [group][8][kGroup]: points
-  Array<std::uint16_t> heads;          // [group][4][4]: those of corner 0, 2, 4 or 6 in the first
-                                       // lane of each quarter, all that is read of rows
-  std::vector<std::uint16_t> kind;     // per group: index into kinds on level 0, else StoredKind
-  std::vector<std::uint8_t> row;       // per group: RowKind
-  std::vector<std::int32_t> slots_at;  // per group: -1, or where its slots lie: some corner hangs
-  std::vector<std::int32_t> patch_of;  // per group, -1: none
-  std::vector<std::uint16_t> slots;    // [folded group][8][kGroup]: points
+  std::vector<std::int32_t> cell;        // per lane, -1: none
+  std::vector<std::int32_t> lane;        // per cell
+  Array<std::uint16_t> corners;          // [group][8][kGroup]: points
+  std::vector<std::int32_t> corners_at;  // per group: where its corners lie, -1: nowhere, for it is
+                                         // in rows; empty: each group's in its place
+  Array<std::uint16_t> heads;            // [group][4][4]: those of corner 0, 2, 4 or 6 in the first
+                                         // lane of each quarter, all that is read of rows
+  std::vector<std::uint16_t> kind;       // per group: index into kinds on level 0, else StoredKind
+  std::vector<std::uint8_t> row;         // per group: RowKind
+  std::vector<std::int32_t> slots_at;    // per group: -1, or where its slots lie: some corner hangs
+  std::vector<std::int32_t> patch_of;    // per group, -1: none
+  std::vector<std::uint16_t> slots;      // [folded group][8][kGroup]: points
 
   std::vector<std::int32_t> vertex;  // per packed vertex: that of the level, -1: none
   std::vector<std::int32_t> packed;  // per vertex of the level
@@ -250,6 +252,13 @@ struct PatchedLevel {
   static bool is_shared(std::int32_t home) { return home < kNowhere; }
 
   bool folded(std::size_t group) const { return slots_at[group] >= 0; }
+  /// Not of groups in rows once these are forgotten.
+  const std::uint16_t* corners_of(std::size_t group) const {
+    const std::size_t at = corners_at.empty() ? group : static_cast<std::size_t>(corners_at[group]);
+    return corners.data() + 8 * kGroup * at;
+  }
+  /// Where no cut is to come: groups in rows keep what is read of them, their heads.
+  void forget_rows();
   /// Whether the cells of a group are wholly held.
   bool idle(std::size_t group) const {
     return kinds.empty() ? kind[group] == kIdle : kinds[kind[group]].idle;

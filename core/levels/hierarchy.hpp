@@ -128,6 +128,8 @@ struct Hierarchy {
   /// Gives back what blades, and some backends, ask for alone: links, and incidences of all levels
   /// but the coarsest. The hierarchy cannot be updated then.
   void forget_neighbours();
+  /// Whether it can follow a cut.
+  bool has_neighbours() const { return !levels.empty() && !levels[0].link_begin.empty(); }
   std::size_t bytes() const;
 };
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 //
-// The fast backend on several threads: the same bits.
+// The fast backend on several threads, and of a body that no blade will meet: the same bits.
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <string>
 
+#include "core/base/error.hpp"
+#include "core/levels/update.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/solves.hpp"
 
@@ -57,6 +59,40 @@ TEST(FastBackend, RestrictsWhatResidualsLeaveToTheSameBits) {
         EXPECT_GT(found.norm(), 0);
       }
     }
+}
+
+// A hierarchy that no blade will meet has no neighbours, and the backend keeps less of it.
+TEST(FastBackend, ComputesTheSameWithoutNeighboursInLessMemory) {
+  const Problem whole = test::cut_block({21, 14, 11}, {9.3, 5.2, 4.1}, 5, 60);
+  Problem bare = test::cut_block({21, 14, 11}, {9.3, 5.2, 4.1}, 5, 60);
+  bare.hierarchy.forget_neighbours();
+  ASSERT_TRUE(whole.hierarchy.has_neighbours());
+  ASSERT_FALSE(bare.hierarchy.has_neighbours());
+  for (const char* machine : {"fast", "mixed"}) {
+    SCOPED_TRACE(machine);
+    const Loaded a(whole, test::make_backend(machine), kDynamic, {}, whole.deformation());
+    const Loaded b(bare, test::make_backend(machine), kDynamic, {}, whole.deformation());
+    EXPECT_LT(b.backend->bytes(), a.backend->bytes());
+    for (int l = 0; l < whole.levels(); ++l) {
+      Vector product[2], smoothed[2];
+      for (int i = 0; i < 2; ++i) {
+        Backend& backend = *(i == 0 ? a : b).backend;
+        test::write(backend, l, kKrylovX, whole.free_vector(l, 7));
+        backend.apply(l, kKrylovX, kKrylovV);
+        product[i] = whole.read(backend, l, kKrylovV);
+        if (l + 1 == whole.levels()) continue;
+        test::write(backend, l, kRight, whole.free_vector(l, 8));
+        backend.zero(l, kSolution);
+        backend.smooth(l, SweepOrder::forward, 2);
+        smoothed[i] = whole.read(backend, l, kSolution);
+      }
+      EXPECT_EQ(product[0], product[1]);
+      EXPECT_EQ(smoothed[0], smoothed[1]);
+    }
+    HierarchyChange none;
+    none.levels.resize(bare.hierarchy.levels.size());
+    EXPECT_THROW(b.backend->update(bare.hierarchy, none), Error);
+  }
 }
 
 }  // namespace

@@ -129,8 +129,8 @@ TEST(Patches, HaveTheirCopiesInOrder) {
   EXPECT_LT(4 * jumps, pairs);
 }
 
-// The first patch of a body of 64^3 cells would have 64 by 16 by 16 of them; here half of these have
-// eight points of their own each.
+// The first patch of a body of 64^3 cells would have 64 by 16 by 16 of them; here half of these
+// have eight points of their own each.
 TEST(Patches, OfLooseCellsHaveNumbersForAllPoints) {
   LinkedOctree body(test::box_body({64, 64, 64}), 0);
   for (int z = 0; z < 16; ++z)
@@ -159,6 +159,32 @@ TEST(Patches, OfLooseCellsHaveNumbersForAllPoints) {
 TEST(Patches, AreWholeWithoutDuplicates) {
   const Problem p = cut_octree(false);
   test::expect_whole(patches_of(p.hierarchy, 1));
+}
+
+// Where no cut is to come: the corners of other groups are where they are read, and are the same.
+TEST(Patches, ForgetCornersOfRowsAlone) {
+  const Problem p = cut_octree(true);
+  int in_rows = 0, others = 0;
+  for (const PatchedLevel& whole : patches_of(p.hierarchy, 1)) {
+    PatchedLevel l = whole;
+    l.forget_rows();
+    ASSERT_EQ(l.corners_at.size(), l.groups());
+    for (std::size_t g = 0; g < l.groups(); ++g) {
+      if (cpu::run_of(cpu::RowKind(l.row[g])) > 1) {
+        EXPECT_EQ(l.corners_at[g], -1);
+        ++in_rows;
+      } else {
+        const std::uint16_t *const was = whole.corners_of(g), *const is = l.corners_of(g);
+        EXPECT_TRUE(std::equal(was, was + 8 * kGroup, is)) << g;
+        ++others;
+      }
+    }
+    EXPECT_EQ(l.heads, whole.heads);
+    EXPECT_EQ(l.row, whole.row);
+    EXPECT_LE(l.corners.size(), whole.corners.size());
+  }
+  EXPECT_GT(in_rows, 50);
+  EXPECT_GT(others, 50);
 }
 
 /// All that a sweep, a transfer or a coarse matrix reads.
