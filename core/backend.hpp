@@ -24,7 +24,7 @@ namespace kerf {
 enum VectorId : int {
   kSolution,   ///< u of A u = f
   kRight,      ///< f
-  kResidual,   ///< f - A u
+  kResidual,   ///< f - A u (on the fast backend where it is asked for, not of a cycle)
   kDirection,  ///< of a recursion: Chebyshev (not of the fast backend), Lanczos
   kScratch,    ///< product of the Chebyshev recursion and of the Krylov methods
   kKrylovX,    ///< two vectors of the K-cycle

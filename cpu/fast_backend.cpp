@@ -26,7 +26,7 @@ std::size_t FastBackend<S>::bytes() const {
   std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + rotations_.bytes() +
                     bytes_of(exact_materials_) + bytes_of(single_materials_);
   for (const FastLevel<S>& level : levels_) {
-    sum += level.patched.bytes() + level.matrices.bytes() + level.inverse.bytes() +
+    sum += level.patched.bytes() + level.matrices.bytes() + level.inverse_diagonals.bytes() +
            level.vectors.bytes();
   }
   if (coarsest_) sum += coarsest_->value.capacity() * 12 + coarsest_factor_.bytes();
@@ -87,7 +87,7 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
     level.bound = 0;
     level.solution_is_zero = false;
     const std::size_t scalars = kTileScalars * level.patched.tiles();
-    level.inverse.assign(level.patched.tiles(), follows);
+    level.inverse_diagonals.assign(level.patched.tiles(), follows);
     level.vectors.assign(l == 0 ? exact_on_finest_ : std::vector<bool>(kLevelVectors, kIsDouble),
                          scalars, follows);
   }
@@ -139,7 +139,7 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
     level.bound = 0;
     const std::size_t size = kTileScalars * level.patched.tiles();
     // Made anew where there are vertices; elsewhere what is left of it meets zeros.
-    level.inverse.resize(level.patched.tiles());
+    level.inverse_diagonals.resize(level.patched.tiles());
     for (std::size_t x = 0; x < level.vectors.size(); ++x) {
       renumber(moves.vertices, size, level.vectors.held(x).single);
       renumber(moves.vertices, size, level.vectors.held(x).exact);

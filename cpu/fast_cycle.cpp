@@ -81,7 +81,8 @@ void FastBackend<S>::chebyshev_step(int level, const Value& value, double step, 
       [&](std::size_t group, const S* x, S* y) { add_products(level, group, x, y); },
       [&](std::size_t tile, int first, const V& sum, const auto& before) {
         const V r = load_tile(f, tile, first) - masked(sum, l.fixed(tile, first));
-        store_tile(u, tile, first, before() + Pack<S>(by) * l.inverse.times(tile, first, r));
+        store_tile(u, tile, first,
+                   before() + Pack<S>(by) * l.inverse_diagonals.times(tile, first, r));
         return Sums{};
       });
 }
@@ -102,7 +103,7 @@ void FastBackend<S>::chebyshev(int level) {
   const S* f = l.at(kRight);
   const auto first_step = static_cast<S>(steps[0]);
   const auto from_zero = [&](std::size_t tile, int first) {
-    return Pack<S>(first_step) * l.inverse.times(tile, first, load_tile(f, tile, first));
+    return Pack<S>(first_step) * l.inverse_diagonals.times(tile, first, load_tile(f, tile, first));
   };
   const auto corrected = [&](std::size_t tile, int first) {
     return load_tile(static_cast<const S*>(u), tile, first) +
@@ -285,7 +286,7 @@ void FastBackend<S>::precondition_jacobi(int level, int in, int out) {
     for_tiles(0, l.tiles(), [&](std::size_t tile) {
       for_packs<S>([&](int first) {
         store_tile_as(to, tile, first,
-                      l.inverse.times(tile, first, load_tile_as<S>(from, tile, first)));
+                      l.inverse_diagonals.times(tile, first, load_tile_as<S>(from, tile, first)));
       });
     });
   });
@@ -296,9 +297,10 @@ void FastBackend<S>::move_points(std::span<const BoundPoint> points, int displac
                                  std::span<Vec3d> positions) {
   settle();
   const FastLevel<S>& l = levels_[0];
-  FastVector& u = levels_[0].vectors[static_cast<std::size_t>(displacement)];
+  const FastVector& u = l.vectors.held(static_cast<std::size_t>(displacement));
   with_types(u, u, [&](const auto* from, const auto*) {
     const auto at = [&](std::int32_t v) {
+      if (u.is_empty()) return Vec3<double>{};
       const auto* const x = from + scalar_of(l.patched.packed[v]);
       return Vec3<double>{double(x[0]), double(x[kGroup]), double(x[2 * kGroup])};
     };
@@ -515,6 +517,7 @@ template <class S>
 NearCells FastBackend<S>::find_near(int displacement, const BladeReach& reach,
                                     std::span<const std::int32_t> opened) const {
   expects_exact(displacement, displacement);
+  ensures(levels_[0].patched.corners_at.empty(), "cells near a blade are asked for without links");
   FastBackend& self = *const_cast<FastBackend*>(this);  // what was asked for before
   self.settle();
   return cpu::find_near(levels_[0].patched, hierarchy_->spacing,

@@ -117,7 +117,7 @@ template <class S>
 struct FastLevel {
   PatchedLevel patched;
   StoredMatrices<S> matrices;  // levels above 0
-  InverseDiagonals<S> inverse;  // of diagonal blocks
+  InverseDiagonals<S> inverse_diagonals;
   LazyVectors vectors;
   double bound = 0;  // of the spectrum of D^-1 A
   bool solution_is_zero = false;
@@ -334,7 +334,8 @@ class FastBackend final : public Backend {
   SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
-  Array<double> partial_;     // sums of shared vertices, by copy; of the scalars of the sweep
+  Array<double> partial_;     // of shared vertices: sums by copy, in the scalars of the sweep;
+                              // and what a level gives to the next
   int waiting_ = -1;          // level whose solution is still to be corrected
   std::vector<Vec3d> faces_;  // of the surface: area normals
   std::unique_ptr<AssembledLevel> coarsest_;

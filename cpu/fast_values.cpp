@@ -204,10 +204,11 @@ void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S
   P keep[3];
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
-  l.inverse.store(tile, first,
-                  kernels::inverse_semidefinite(kernels::Sym3<P>{
-                      keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
-                      keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z}));
+  l.inverse_diagonals.store(
+      tile, first,
+      kernels::inverse_semidefinite(kernels::Sym3<P>{
+          keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+          keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z}));
 }
 
 template <class S>

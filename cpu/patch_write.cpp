@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <utility>
+
+#include "core/base/error.hpp"
 #include "cpu/patcher.hpp"
 #include "kernels/transfer.hpp"
 
@@ -15,6 +19,23 @@ void move_items(const Range& before, const Range& now, std::ptrdiff_t width,
 }
 
 }  // namespace
+
+void PatchedLevel::forget_rows() {
+  ensures(corners_at.empty(), "a level forgets its rows again");
+  constexpr std::size_t kBlock = 8 * kGroup;
+  const auto in_rows = [](std::uint8_t as) { return run_of(static_cast<RowKind>(as)) > 1; };
+  const auto others =
+      groups() - static_cast<std::size_t>(std::count_if(row.begin(), row.end(), in_rows));
+  Array<std::uint16_t> kept;
+  kept.reserve(kBlock * others);
+  corners_at.assign(groups(), -1);
+  for (std::size_t g = 0; g < groups(); ++g) {
+    if (in_rows(row[g])) continue;
+    corners_at[g] = static_cast<std::int32_t>(kept.size() / kBlock);
+    kept.insert(kept.end(), corners.data() + kBlock * g, corners.data() + kBlock * (g + 1));
+  }
+  corners = std::move(kept);
+}
 
 void PatchWriter::write() {
   if (!draft_.anew) move_ranges();

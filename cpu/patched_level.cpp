@@ -537,22 +537,6 @@ void PatchedLevel::set_heads(std::size_t group) {
           corners[8 * kGroup * group + 2 * kGroup * edge + kGroup / 4 * quarter];
 }
 
-void PatchedLevel::forget_rows() {
-  constexpr std::size_t kBlock = 8 * kGroup;
-  const auto in_rows = [](std::uint8_t as) { return run_of(static_cast<RowKind>(as)) > 1; };
-  const auto others =
-      groups() - static_cast<std::size_t>(std::count_if(row.begin(), row.end(), in_rows));
-  Array<std::uint16_t> kept;
-  kept.reserve(kBlock * others);
-  corners_at.assign(groups(), -1);
-  for (std::size_t g = 0; g < groups(); ++g) {
-    if (in_rows(row[g])) continue;
-    corners_at[g] = size_of(kept.size() / kBlock);
-    kept.insert(kept.end(), corners.data() + kBlock * g, corners.data() + kBlock * (g + 1));
-  }
-  corners = std::move(kept);
-}
-
 void PatchedLevel::empty_group(std::int32_t g) {
   std::fill_n(cell.begin() + kGroup * g, kGroup, -1);
   if (!children.empty())

@@ -33,7 +33,8 @@
 
 namespace kerf::cpu {
 
-/// What an array holds. Room at its end that was never written takes no memory.
+/// What an array holds. Room at its end that was never written takes no memory; what one had before
+/// it became shorter is not counted.
 template <class T, class Allocator>
 std::size_t bytes_of(const std::vector<T, Allocator>& array) {
   return array.size() * sizeof(T);
@@ -215,7 +216,7 @@ struct PatchedLevel {
 
   std::vector<std::int32_t> cell;        // per lane, -1: none
   std::vector<std::int32_t> lane;        // per cell
-  Array<std::uint16_t> corners;          // [group][8][kGroup]: points
+  Array<std::uint16_t> corners;          // [group][8][kGroup]: points; or as corners_at says
   std::vector<std::int32_t> corners_at;  // per group: where its corners lie, -1: nowhere, for it is
                                          // in rows; empty: each group's in its place
   Array<std::uint16_t> heads;            // [group][4][4]: those of corner 0, 2, 4 or 6 in the first

@@ -25,9 +25,9 @@ inline void return_freed_memory() {
 #endif
 }
 
-/// For the main function of a program: large blocks go back to the machine as soon as they are
-/// freed. By itself glibc takes a block as large as one that was freed for a common one, and keeps
-/// what it had: a sixth of what a run holds.
+/// For the main function of a program: blocks from 1 MB on go back to the machine when they are
+/// freed. By itself glibc takes blocks as large as one that was freed for common ones from then on,
+/// and keeps them (docs/decisions/0024-what-is-held.md).
 inline void return_large_blocks_when_freed() {
 #if defined(__GLIBC__)
   constexpr int kLarge = 1 << 20, kKept = 1 << 25;

@@ -128,7 +128,7 @@ struct Hierarchy {
   /// Gives back what blades, and some backends, ask for alone: links, and incidences of all levels
   /// but the coarsest. The hierarchy cannot be updated then.
   void forget_neighbours();
-  /// Whether it can follow a cut.
+  /// Whether these are there, so that it can be updated.
   bool has_neighbours() const { return !levels.empty() && !levels[0].link_begin.empty(); }
   std::size_t bytes() const;
 };

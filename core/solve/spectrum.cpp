@@ -37,7 +37,7 @@ double estimate_spectral_bound(Backend& backend, int level, const Level& structu
   // Eight steps find the largest eigenvalue to some per cent from below. Chebyshev of degree 2 on
   // [l/8, l] still damps at 1.13 l, so that a margin of a tenth is on the safe side twice.
   constexpr double kMargin = 1.1;
-  const int r = kResidual, p = kDirection, q = kRight, z = kSolution;  // those of every cycle
+  const int r = kResidual, p = kDirection, q = kRight, z = kSolution;  // a cycle overwrites them
   backend.write_noise(level, r, 3 * structure.point.size());
   backend.mask(level, r);
   std::vector<double> diagonal, beside;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/body/cut.hpp"
 #include "core/levels/update.hpp"
 #include "core/solve/linear_solver.hpp"
 #include "tests/support/solves.hpp"
@@ -92,6 +93,8 @@ TEST(FastBackend, ComputesTheSameWithoutNeighboursInLessMemory) {
     HierarchyChange none;
     none.levels.resize(bare.hierarchy.levels.size());
     EXPECT_THROW(b.backend->update(bare.hierarchy, none), Error);
+    const BladeReach reach(TriangleMesh{{{1, 0, 0}, {1, 9, 0}, {1, 0, 9}}, {{0, 1, 2}}});
+    EXPECT_THROW(b.backend->find_near(b.extra, reach, {}), Error);
   }
 }
 

@@ -49,6 +49,7 @@ enum class Holds {
   none,
   one_side,  ///< all of the low x side
   dense,     ///< all but one vertex in eight, which no coarse grid has
+  slides,    ///< low x side, and x of a slab but for one vertex in each block of eight
   mixed      ///< a slab that no coarse grid agrees with, and single components here and there
 };
 
@@ -180,6 +181,9 @@ struct Problem {
       int bits = 0;
       if (options.holds != Holds::none && p[0] == 0) bits = 7;
       if (options.holds == Holds::dense && (p[0] & p[1] & p[2] & 1) == 0) bits = 7;
+      if (options.holds == Holds::slides && p[0] < 17 &&
+          !(p[0] % 8 == 3 && p[1] % 8 == 3 && p[2] % 8 == 3))
+        bits |= 1;
       if (options.holds == Holds::mixed && p[0] == 1) bits |= 1;
       if (options.holds == Holds::mixed && dice.roll(12) == 0) bits |= 1 << dice.roll(3);
       finest.fixed[v] = static_cast<std::uint8_t>(bits);
