@@ -207,7 +207,8 @@ class Backend {
                           std::span<const double> values);
   virtual void read_some(int level, int x, std::span<const std::int32_t> vertices,
                          std::span<double> values) const;
-  /// What a blade may meet: as near_cells in core/levels/corners.hpp.
+  /// What a blade may meet: as near_cells in core/levels/corners.hpp. Of a hierarchy with
+  /// neighbours alone, as update.
   virtual NearCells find_near(int displacement, const BladeReach& reach,
                               std::span<const std::int32_t> opened) const;
 };

@@ -11,6 +11,9 @@
 
 namespace kerf::cpu {
 
+/// What is stored as an integer goes from minus this to this.
+inline constexpr float kGreatestCode = 32767;
+
 /// Integers as scalars.
 inline Pack<float> widened(const std::int16_t* from) {
 #if KERF_PACK_BITS == 512

@@ -9,8 +9,8 @@
 //         entry times that on the diagonal of its row: where supports leave a millionth of one
 //         component, it stays, to 3 per cent.
 //         A block stays definite if, scaled to ones on its diagonal, its condition is below 2e4.
-//         That of a sum over cells of one kind is at most (2 - 2 nu) / (1 - 2 nu): 51 for nu =
-//         0.49, 2e4 for 0.49995.
+//         Where supports hold all components or none, that of a sum over cells of one kind is at
+//         most (2 - 2 nu) / (1 - 2 nu): 51 for nu = 0.49, 2e4 for 0.49995.
 #pragma once
 
 #include <cstddef>
@@ -53,7 +53,7 @@ class InverseDiagonals {
     if (first == 0) prefetch_tile(entries_.data(), tile, kOfVertex);
     const Entry* const at = entries_.data() + kOfTile * tile + first;
     if constexpr (kIsCoded) {
-      const P unit = load_upper(at), part = P(1 / kGreatest);
+      const P unit = load_upper(at), part = P(1 / kGreatestCode);
       const auto root = [&](int e) { return unit * widened(at + kGroup * e); };
       const auto beside = [&](int e) { return part * widened(at + kGroup * e); };
       const P sx = root(1), sy = root(2), sz = root(3);
@@ -76,14 +76,13 @@ class InverseDiagonals {
   static constexpr bool kIsCoded = std::is_same_v<S, float>;
   using Entry = std::conditional_t<kIsCoded, std::int16_t, S>;
   static constexpr std::size_t kOfVertex = kIsCoded ? 7 : 6, kOfTile = kGroup * kOfVertex;
-  static constexpr float kGreatest = 32767;
 
   static void encode(const kernels::Sym3<P>& inverse, std::int16_t* to) {
     const P none = P(0), least = P(1e-30);  // a part of which has an inverse
     const auto root_of = [&](const P& a) { return select(a > none, sqrt(a), none); };
     P s[] = {root_of(inverse.xx), root_of(inverse.yy), root_of(inverse.zz)};
     const P greatest = greater_size(s[0], greater_size(s[1], greater_size(s[2], least)));
-    const P unit = rounded_up(greatest * P(1 / kGreatest));
+    const P unit = rounded_up(greatest * P(1 / kGreatestCode));
     const P by = P(1) / unit;
     for (int c = 0; c < 3; ++c) {
       store_narrowed(to + kGroup * (1 + c), s[c] * by);
@@ -92,7 +91,7 @@ class InverseDiagonals {
     const auto put = [&](int e, const P& entry, const P& a, const P& b) {
       const P size = a * b, ratio = select(size > none, entry / size, none);
       const P most = select(ratio > P(1), P(1), select(ratio < P(-1), P(-1), ratio));
-      store_narrowed(to + kGroup * e, most * P(kGreatest));
+      store_narrowed(to + kGroup * e, most * P(kGreatestCode));
     };
     put(4, inverse.xy, s[0], s[1]);
     put(5, inverse.xz, s[0], s[2]);

@@ -138,10 +138,10 @@ struct Ends {
 }  // namespace
 
 std::size_t Transfer::bytes() const {
-  const auto of = [](const auto& array) { return array.capacity() * sizeof(array[0]); };
-  return of(parts) + of(point) + of(tiles) + of(lead_blocks) + of(runs) + of(term_point) +
-         of(term_weight) + of(others) + of(lead) + of(lead_others) + of(giver_begin) + of(givers) +
-         of(giver_rows.count);
+  return bytes_of(parts) + bytes_of(point) + bytes_of(tiles) + bytes_of(lead_blocks) +
+         bytes_of(runs) + bytes_of(term_point) + bytes_of(term_weight) + bytes_of(others) +
+         bytes_of(lead) + bytes_of(lead_others) + bytes_of(giver_begin) + bytes_of(givers) +
+         bytes_of(giver_rows.count);
 }
 
 FirstCells::FirstCells(const Level& level) : level_(level) {

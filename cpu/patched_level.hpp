@@ -33,13 +33,6 @@
 
 namespace kerf::cpu {
 
-/// What an array holds. Room at its end that was never written takes no memory; what one had before
-/// it became shorter is not counted.
-template <class T, class Allocator>
-std::size_t bytes_of(const std::vector<T, Allocator>& array) {
-  return array.size() * sizeof(T);
-}
-
 /// Cells of a group and vertices of a tile: those of the widest pack.
 inline constexpr int kGroup = 16;
 inline constexpr std::size_t kTileScalars = 3 * kGroup;

@@ -120,9 +120,8 @@ class StoredMatrices {
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
   std::size_t bytes() const {
-    return (begin_.capacity() + rotations_at_.capacity()) * sizeof(begin_[0]) + traits_.capacity() +
-           (rotations_.capacity() + plain_.capacity()) * sizeof(S) +
-           codes_.capacity() * sizeof(codes_[0]) + unit_.capacity() * sizeof(S);
+    return bytes_of(begin_) + bytes_of(rotations_at_) + bytes_of(traits_) + bytes_of(rotations_) +
+           bytes_of(plain_) + bytes_of(codes_) + bytes_of(unit_);
   }
 
   /// Of the lanes from `first` on.
@@ -249,7 +248,7 @@ class StoredMatrices {
     const P greatest =
         greater_size(greater_size(sizes[0], sizes[1]), greater_size(sizes[2], sizes[3]));
     const P none = P(S(1e-30));
-    const P unit = select(greatest > none, greatest, none) * P(S(1) / S(32767));
+    const P unit = select(greatest > none, greatest, none) * P(S(1) / S(kGreatestCode));
     const P inverse = P(S(1)) / unit;
     store_pack(unit_.data() + kGroup * group + first, unit);
     std::int16_t* to = codes_.data() + kGroup * std::size_t{begin_[group]} + first;

@@ -13,7 +13,7 @@ void surface_normals(const SurfaceView& surface, std::span<const Vec3d> position
   for_points(surface.points.size(), threads, [&](std::int32_t p) {
     for (std::int32_t c = surface.first_corner[p]; c >= 0;) {
       const std::int32_t normal = surface.normal_of[c];
-      kernels::Vec3<double> sum{};
+      Vec3d sum{};
       for (; c >= 0 && surface.normal_of[c] == normal; c = surface.next_corner[c])
         sum += faces[c / 3];
       normals[normal] = kernels::unit_or_z(sum);

@@ -32,7 +32,7 @@ void move_points(const Level& level, std::span<const BoundPoint> points,
     const BoundPoint& point = points[p];
     positions[p] = point.reference;
     if (point.cell < 0) return;
-    kernels::Vec3<double> at[8], corners[8];
+    Vec3d at[8], corners[8];
     for (int i = 0; i < 8; ++i) at[i] = displacement(level.slots[point.cell][i]);
     kernels::unfold(at, level.fold[point.cell], corners);
     positions[p] += kernels::trilinear(corners, point.local);

@@ -65,4 +65,11 @@ struct LargePageAllocator {
 template <class T>
 using Array = std::vector<T, LargePageAllocator<T>>;
 
+/// What an array holds. Room at its end that was never written takes no memory; what one had before
+/// it became shorter is not counted.
+template <class T, class Allocator>
+std::size_t bytes_of(const std::vector<T, Allocator>& array) {
+  return array.size() * sizeof(T);
+}
+
 }  // namespace kerf

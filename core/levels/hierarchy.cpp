@@ -5,18 +5,13 @@
 #include <bit>
 #include <tuple>
 
+#include "core/base/array.hpp"
 #include "core/base/error.hpp"
 #include "core/levels/union_find.hpp"
 #include "kernels/transfer.hpp"
 
 namespace kerf {
 namespace {
-
-// Room that is reserved and was never written takes no memory.
-template <class T>
-std::size_t bytes_of(const std::vector<T>& v) {
-  return v.size() * sizeof(T);
-}
 
 // For each fine cell the first cell of its group; groups become coarse cells.
 std::vector<std::int32_t> group_cells(const Level& fine, int log2, bool duplicate) {

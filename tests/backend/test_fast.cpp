@@ -514,22 +514,6 @@ TEST(MixedPrecision, SolvesBodiesWithLooseCellsInDynamics) {
   EXPECT_LE(cycles("mixed"), exact + 2);
 }
 
-// On coarse levels the held component of a vertex is that of one fine vertex alone.
-TEST(MixedPrecision, SolvesBodiesWithPartialSupports) {
-  ProblemOptions options;
-  options.holds = test::Holds::slides;
-  options.coarsest_vertices = 60;
-  options.with_oracle = false;
-  const Problem p(LinkedOctree(test::box_body({48, 32, 32}), 0), options);
-  ASSERT_GE(p.hierarchy.levels.size(), 4u);
-  const auto cycles = [&](const char* machine) {
-    const SolveStats stats = test::solve(p, *test::make_backend(machine), {}, {1, 0}, 1e-9).stats;
-    EXPECT_TRUE(stats.converged) << machine;
-    return stats.cycles;
-  };
-  EXPECT_LE(cycles("mixed"), cycles("fast") + 1);
-}
-
 // What the vector held before does not matter, and a fixed number of cycles gets as far as in
 // double.
 TEST(MixedPrecision, EveryMethodSolvesFromAnything) {

@@ -49,7 +49,7 @@ enum class Holds {
   none,
   one_side,  ///< all of the low x side
   dense,     ///< all but one vertex in eight, which no coarse grid has
-  slides,    ///< low x side, and x of a slab but for one vertex in each block of eight
+  slides,    ///< low x side, and x of a slab but for one vertex in each block of 8^3
   mixed      ///< a slab that no coarse grid agrees with, and single components here and there
 };
 
