@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
-// Cells that are one element each: those of level 0, and those of level 1 of which rotations alone
-// are stored (cpu/stored_matrices.hpp). Loading of lanes, no loops over groups and no threads.
+// Cells that are one element each: those of level 0, and those of the levels above it of which
+// rotations alone are stored (cpu/stored_matrices.hpp). Loading of lanes, no loops over groups and
+// no threads.
 #pragma once
 
 #include <algorithm>
@@ -29,15 +30,19 @@ struct FinestCells {
   T component(std::size_t lane, std::size_t c) const {
     return rotations.template component<T>(lane, c);
   }
+  template <int kLanes = kGroup>
+  static bool are_all(const std::int32_t*) {
+    return true;
+  }
 };
 
-/// What a cell of level 1 is as one element.
+/// What a cell of a level above level 0 is as one element.
 inline CellKind element_kind(const std::vector<CellKind>& finest, std::uint16_t kind) {
   CellKind out = finest[finest_kind(kind)];
-  if (!is_of_eight(kind)) return out;
-  out.stiffness *= 2;  // E side
-  out.mass *= 8;
-  out.side *= 2;
+  const double times = 1 << doublings(kind);
+  out.stiffness *= times;  // E side
+  out.mass *= times * times * times;
+  out.side *= times;
   return out;
 }
 
@@ -52,10 +57,11 @@ struct TurnedCells {
   T component(std::size_t lane, std::size_t c) const {
     return rotation(lane)[kGroup * c];
   }
-  /// Whether all children are such. `lanes`: [octant][kGroup], -1: none.
+  /// Whether all children are such, of so many parents. `lanes`: [octant][kGroup], -1: none.
+  template <int kLanes = kGroup>
   bool are_all(const std::int32_t* lanes) const {
     for (int octant = 0; octant < 8; ++octant)
-      for (int k = 0; k < Pack<S>::kLanes; ++k)
+      for (int k = 0; k < kLanes; ++k)
         if (const std::int32_t lane = lanes[kGroup * octant + k];
             lane >= 0 && !matrices.is_turned(static_cast<std::size_t>(lane / kGroup)))
           return false;
@@ -168,8 +174,8 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
 
 /// The mean rotations of eight cells each; false where the cosine of half the angle of one from its
 /// mean is less than `least`. `children`: [octant][kGroup], lanes of the cells, -1: none of them.
-template <class S>
-bool mean_rotation(const FinestCells<S>& cells, const std::int32_t* children, double least,
+template <class S, class Cells>
+bool mean_rotation(const Cells& cells, const std::int32_t* children, double least,
                    kernels::Quat<Pack<S>>& mean) {
   using P = Pack<S>;
   kernels::Quat<P> of[8];

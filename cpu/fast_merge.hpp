@@ -286,8 +286,7 @@ struct AddedEntries {
   Entry operator[](int entry) const { return {to[entry]}; }
 };
 
-/// Adds the matrices of cells in some lanes (-1: none) of level 1 of which only rotations are
-/// stored.
+/// Adds the matrices of cells in some lanes (-1: none) of which only rotations are stored.
 template <class S>
 void add_turned(const TurnedCells<S>& cells, const std::vector<PackedMaterial<S>>& materials,
                 const OperatorScale& scale, const std::int32_t (&lanes)[Pack<S>::kLanes],

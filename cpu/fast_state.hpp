@@ -293,10 +293,11 @@ class FastBackend final : public Backend {
     const std::vector<CellKind>& kinds = levels_[0].patched.kinds;
     return level == 0 ? kinds[kind] : cpu::element_kind(kinds, kind);
   }
-  TurnedCells<S> turned_cells() const {
-    return {levels_[0].patched, levels_[1].patched, levels_[1].matrices};
+  TurnedCells<S> turned_cells(int level) const {
+    return {levels_[0].patched, levels_[level].patched, levels_[level].matrices};
   }
-  void turn();
+  template <class Cells>
+  void turn(int level, const Cells& children);
   void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
   void corner_children(const std::int32_t (&child)[Pack<S>::kLanes],

@@ -20,7 +20,7 @@ void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack
                                      Pack<S> (&out)[kEntries]) const {
   const FastLevel<S>& l = levels_[level];
   l.matrices.gather(lanes, out);
-  if (level == 1) add_turned(turned_cells(), materials<S>(), scale_, lanes, out);
+  add_turned(turned_cells(level), materials<S>(), scale_, lanes, out);
 }
 
 // Cells of level 0 in some lanes over their corners, zero where those are held.
@@ -119,33 +119,34 @@ void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first
   });
 }
 
-// Rotations of the cells of level 1 that are one element each, or may be. Eight cells of one
-// rotation are exactly an element of twice the side. In single precision, where matrices only
+// Rotations of the cells of a level that are one element each, or may be. Eight elements of one
+// rotation are exactly one of twice the side. In single precision, where matrices only
 // precondition, nearly one rotation is enough.
 template <class S>
-void FastBackend<S>::turn() {
+template <class Cells>
+void FastBackend<S>::turn(int level, const Cells& cells) {
   constexpr double kNear = 0.1;  // radians
   const double least = std::cos(0.5 * kNear);
-  FastLevel<S>& to = levels_[1];
+  FastLevel<S>& to = levels_[level];
   const PatchedLevel& packed = to.patched;
-  const FinestCells<S> cells{levels_[0].patched, rotations_};
   // The mass of lumped cells is not that of a lumped one.
-  const bool may_be_one =
-      !kIsDouble && levels_.size() > 2 && (scale_.mass == 0 || !hierarchy_->lumped_mass);
+  const bool may_be_one = !kIsDouble && level + 1 < static_cast<int>(levels_.size()) &&
+                          (scale_.mass == 0 || !hierarchy_->lumped_mass);
   const auto groups = static_cast<std::int32_t>(packed.groups());
 #pragma omp parallel for num_threads(threads_) schedule(static) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
     const auto group = static_cast<std::size_t>(g);
     if (!is_of_finest(packed.kind[group])) continue;
     const bool eight = is_of_eight(packed.kind[group]);
-    bool is_one = !eight || may_be_one;
+    const std::int32_t* const all = packed.children.data() + 8 * kGroup * group;
+    bool is_one = !eight || (may_be_one && cells.are_all(all));
     if (is_one)
       for_packs<S>([&](int first) {
-        const std::int32_t* const children = packed.children.data() + 8 * kGroup * group + first;
+        const std::int32_t* const children = all + first;
         kernels::Quat<Pack<S>> rotation;
         if (!eight)
           load_rotations(cells, children, rotation);
-        else if (!mean_rotation(cells, children, least, rotation))
+        else if (!mean_rotation<S>(cells, children, least, rotation))
           is_one = false;
         to.matrices.store(group, first, rotation);
       });
@@ -161,7 +162,10 @@ void FastBackend<S>::coarsen(int fine) {
   const PatchedLevel& packed = to.patched;
   const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
   to.matrices.start(packed, fine == 0 && !coarsest, scale_.mass != 0);
-  if (fine == 0) turn();
+  if (fine == 0)
+    turn(1, FinestCells<S>{from.patched, rotations_});
+  else
+    turn(fine + 1, turned_cells(fine));
   to.matrices.allocate();
   const auto groups = static_cast<std::int32_t>(packed.groups());
   const std::vector<PackedMaterial<S>>& all = materials<S>();
@@ -185,8 +189,8 @@ void FastBackend<S>::coarsen(int fine) {
                   : merge_general_stored(fine, group, first, out);
       else if (fine == 0)
         merge_elements(FinestCells<S>{from.patched, rotations_}, all, scale_, children, out);
-      else if (fine == 1 && !passed && turned_cells().are_all(children))
-        merge_elements(turned_cells(), all, scale_, children, out);
+      else if (!passed && turned_cells(fine).template are_all<P::kLanes>(children))
+        merge_elements(turned_cells(fine), all, scale_, children, out);
       else
         merge_stored<S>(
             [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
@@ -196,30 +200,40 @@ void FastBackend<S>::coarsen(int fine) {
   }
 }
 
+/// The block of each vertex of a tile, without what supports hold.
 template <class S>
-void invert_tile(FastLevel<S>& l, std::size_t tile, int first, const Vec3<Pack<S>>& upper,
-                 const Vec3<Pack<S>>& lower) {
+kernels::Sym3<Pack<S>> free_block(const FastLevel<S>& l, std::size_t tile, int first,
+                                  const Vec3<Pack<S>>& upper, const Vec3<Pack<S>>& lower) {
   using P = Pack<S>;
   const std::uint8_t* fixed = l.fixed(tile, first);
+  if (std::all_of(fixed, fixed + P::kLanes, [](std::uint8_t held) { return held == 0; }))
+    return {upper.x, upper.y, upper.z, lower.x, lower.y, lower.z};
   P keep[3];
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < P::kLanes; ++k) keep[c].set(k, ((fixed[k] >> c) & 1) != 0 ? S(0) : S(1));
-  l.inverse_diagonals.store(
-      tile, first,
-      kernels::inverse_semidefinite(kernels::Sym3<P>{
-          keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
-          keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z}));
+  return {keep[0] * upper.x, keep[0] * keep[1] * upper.y, keep[0] * keep[2] * upper.z,
+          keep[1] * lower.x, keep[1] * keep[2] * lower.y, keep[2] * lower.z};
 }
 
+/// Two tiles in turn: each operation of a block waits for the one before.
 template <class S>
 void invert_own(FastLevel<S>& l, const Patch& patch, const BlockPoints<S>& from) {
-  for (std::int32_t v = patch.own.first; v < patch.own.end(); v += kGroup)
-    for_packs<S>([&](int first) {
+  for_packs<S>([&](int first) {
+    const auto block = [&](std::int32_t v) {
       const std::uint16_t* points = l.patched.own_point.data() + v + first;
-      invert_tile(l, static_cast<std::size_t>(v / kGroup), first,
-                  gathered(static_cast<const S*>(from.upper), points),
-                  gathered(static_cast<const S*>(from.lower), points));
-    });
+      return free_block(l, static_cast<std::size_t>(v / kGroup), first,
+                        gathered(static_cast<const S*>(from.upper), points),
+                        gathered(static_cast<const S*>(from.lower), points));
+    };
+    const auto store = [&](std::int32_t v, const auto& blocks) {
+      l.inverse_diagonals.store(static_cast<std::size_t>(v / kGroup), first,
+                                kernels::inverse_semidefinite(blocks));
+    };
+    std::int32_t v = patch.own.first;
+    for (; v + kGroup < patch.own.end(); v += 2 * kGroup)
+      store(v, twins(block(v), block(v + kGroup)));
+    if (v < patch.own.end()) store(v, block(v));
+  });
 }
 
 template <class S>
@@ -261,8 +275,11 @@ void FastBackend<S>::prepare(int level) {
   });
   parallel(static_cast<std::int32_t>(packed.shared_tiles.size()), kWorthTiles, [&](std::int32_t n) {
     for_packs<S>([&](int first) {
-      invert_tile(l, static_cast<std::size_t>(packed.shared_tiles[n]), first,
-                  shared_sums(packed, n, first, upper), shared_sums(packed, n, first, lower));
+      const auto tile = static_cast<std::size_t>(packed.shared_tiles[n]);
+      l.inverse_diagonals.store(tile, first,
+                                kernels::inverse_semidefinite(
+                                    free_block(l, tile, first, shared_sums(packed, n, first, upper),
+                                               shared_sums(packed, n, first, lower))));
     });
   });
   if (l.bound == 0 && level + 1 < static_cast<int>(levels_.size())) {

@@ -20,6 +20,7 @@
 #include "core/base/array.hpp"
 #include "cpu/codes.hpp"
 #include "cpu/patch_sweep.hpp"
+#include "cpu/twin.hpp"
 #include "kernels/mat3.hpp"
 
 namespace kerf::cpu {
@@ -37,14 +38,18 @@ class InverseDiagonals {
   /// What was there stays, and new ones are zero.
   void resize(std::size_t tiles) { resize_with_room(entries_, kOfTile * tiles, Entry(0)); }
 
-  /// Of the lanes from `first` on.
-  void store(std::size_t tile, int first, const kernels::Sym3<P>& inverse) {
+  /// Of the lanes from `first` on; those of a twin are of this tile and of the next one.
+  template <class Q>
+  void store(std::size_t tile, int first, const kernels::Sym3<Q>& inverse) {
     Entry* const to = entries_.data() + kOfTile * tile + first;
     if constexpr (kIsCoded) {
       encode(inverse, to);
     } else {
-      const P entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
-      for (int e = 0; e < 6; ++e) store_pack(to + kGroup * e, entries[e]);
+      const Q entries[] = {inverse.xx, inverse.xy, inverse.xz, inverse.yy, inverse.yz, inverse.zz};
+      for (int e = 0; e < 6; ++e)
+        for_each_pack(entries[e], [&](int n, const P& entry) {
+          store_pack(to + kOfTile * std::size_t(n) + kGroup * e, entry);
+        });
     }
   }
 
@@ -77,28 +82,43 @@ class InverseDiagonals {
   using Entry = std::conditional_t<kIsCoded, std::int16_t, S>;
   static constexpr std::size_t kOfVertex = kIsCoded ? 7 : 6, kOfTile = kGroup * kOfVertex;
 
-  static void encode(const kernels::Sym3<P>& inverse, std::int16_t* to) {
-    const P none = P(0), least = P(1e-30);  // a part of which has an inverse
-    const auto root_of = [&](const P& a) { return select(a > none, sqrt(a), none); };
-    P s[] = {root_of(inverse.xx), root_of(inverse.yy), root_of(inverse.zz)};
-    const P greatest = greater_size(s[0], greater_size(s[1], greater_size(s[2], least)));
-    const P unit = rounded_up(greatest * P(1 / kGreatestCode));
-    const P by = P(1) / unit;
-    for (int c = 0; c < 3; ++c) {
-      store_narrowed(to + kGroup * (1 + c), s[c] * by);
-      s[c] = unit * widened(to + kGroup * (1 + c));
-    }
-    const auto put = [&](int e, const P& entry, const P& a, const P& b) {
-      const P size = a * b, ratio = select(size > none, entry / size, none);
-      const P most = select(ratio > P(1), P(1), select(ratio < P(-1), P(-1), ratio));
-      store_narrowed(to + kGroup * e, most * P(kGreatestCode));
+  template <class Q>
+  static void encode(const kernels::Sym3<Q>& inverse, std::int16_t* to) {
+    const auto put = [to](int e, const Q& code) {
+      for_each_pack(code, [&](int n, const P& x) {
+        store_narrowed(to + kOfTile * std::size_t(n) + kGroup * e, x);
+      });
     };
-    put(4, inverse.xy, s[0], s[1]);
-    put(5, inverse.xz, s[0], s[2]);
-    put(6, inverse.yz, s[1], s[2]);
+    const Q none = Q(0), one = Q(1), least = Q(1e-30);  // a part of which has an inverse
+    const auto root_of = [&](const Q& a) { return select(a > none, sqrt(a), none); };
+    Q s[] = {root_of(inverse.xx), root_of(inverse.yy), root_of(inverse.zz)};
+    const Q greatest = greater_size(s[0], greater_size(s[1], greater_size(s[2], least)));
+    const Q unit = upper_part(greatest * Q(1 / kGreatestCode)), by = one / unit;
+    for (int c = 0; c < 3; ++c) {
+      const Q code = rounded(s[c] * by);
+      put(1 + c, code);
+      s[c] = unit * code;
+    }
+    const auto put_beside = [&](int e, const Q& entry, const Q& a, const Q& b) {
+      const Q size = a * b, ratio = select(size > none, entry / size, none);
+      const Q most = select(ratio > one, one, select(ratio < -one, -one, ratio));
+      put(e, most * Q(kGreatestCode));
+    };
+    put_beside(4, inverse.xy, s[0], s[1]);
+    put_beside(5, inverse.xz, s[0], s[2]);
+    put_beside(6, inverse.yz, s[1], s[2]);
     // What is no number has to be seen: integers would hide it.
-    const P all = inverse.xx + inverse.xy + inverse.xz + inverse.yy + inverse.yz + inverse.zz;
-    store_upper(to, unit + P(0) * all);
+    const Q all = inverse.xx + inverse.xy + inverse.xz + inverse.yy + inverse.yz + inverse.zz;
+    for_each_pack(unit + none * all,
+                  [&](int n, const P& x) { store_upper(to + kOfTile * std::size_t(n), x); });
+  }
+  static P upper_part(const P& x) { return rounded_up(x); }
+  static Twin<P> upper_part(const Twin<P>& x) { return {rounded_up(x.a), rounded_up(x.b)}; }
+  /// To the nearest integer: behind 2^23 there are no others.
+  template <class Q>
+  static Q rounded(const Q& x) {
+    const Q shift = Q(3 << 22);
+    return (x + shift) - shift;
   }
 
   Array<Entry> entries_;

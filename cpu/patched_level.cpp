@@ -177,18 +177,21 @@ class Patcher {
     const bool masks = held && finer_->children.empty();  // children of level 0
     if (masks || twice || is_loose(c)) return passed ? kGeneralPassed : kGeneral;
     if (held) return passed ? kHeldPassed : kHeldMerged;
-    if (finer_->children.empty()) {
-      const auto kind = [&](std::int32_t child) {
-        return finer_->kind[finer_->lane[child] / kGroup];
-      };
-      const std::uint16_t first = kind(children[0]);
-      const bool alike = std::all_of(children.begin(), children.end(),
-                                     [&](std::int32_t child) { return kind(child) == first; });
-      if (passed) return kind_of_finest(first, false);
-      if (octants == 0xFF && alike && !kernels::has_hanging(level_.fold[c]))
-        return kind_of_finest(first, true);
-    }
-    return passed ? kPassed : kMerged;
+    const std::uint16_t first = element_kind(children[0]);
+    if (!is_of_finest(first)) return passed ? kPassed : kMerged;
+    if (passed) return first;
+    const bool alike = std::all_of(children.begin(), children.end(), [&](std::int32_t child) {
+      return element_kind(child) == first;
+    });
+    const bool is_one = octants == 0xFF && alike && !kernels::has_hanging(level_.fold[c]) &&
+                        doublings(first) < kMostDoublings;
+    return is_one ? kind_of_finest(cpu::finest_kind(first), doublings(first) + 1)
+                  : std::uint16_t{kMerged};
+  }
+  /// Of a cell of the level before, as the levels above level 0 number kinds.
+  std::uint16_t element_kind(std::int32_t child) const {
+    const std::uint16_t kind = finer_->kind[finer_->lane[child] / kGroup];
+    return finer_->children.empty() ? kind_of_finest(kind, 0) : kind;
   }
 
   // A cell of level 1 that is a whole piece. Its mass alone tells how it turns, and that drowns in
@@ -250,7 +253,7 @@ class Patcher {
     std::vector<std::int32_t> out;
     for (const auto& some : found) out.insert(out.end(), some.begin(), some.end());
     if (below != nullptr)
-      for (const std::int32_t child : below->held) meet(finer_->level->parent[child], met, out);
+      for (const std::int32_t child : below->others) meet(finer_->level->parent[child], met, out);
     std::sort(out.begin(), out.end());
     return out;
   }
@@ -298,7 +301,7 @@ class Patcher {
   }
 
   void list(std::int32_t c, const CellMark& mark) {
-    if (mark.held_changed) moves_.held.push_back(c);
+    if (mark.held_changed || mark.kind_changed) moves_.others.push_back(c);
     Work& work = works_[patch_of(c)];
     if (is_new(c)) {
       work.arrived.push_back(c);
@@ -522,7 +525,7 @@ PatchMoves remake_patches(const Hierarchy& hierarchy, const LevelChange& change,
   for (std::int32_t c = 0; c < level.level->cells(); ++c) {
     const std::int32_t old = change.cells_before;
     moves.cells.push_back({before.lane[c < old ? c : change.origin[c - old]], c});
-    moves.held.push_back(c);
+    moves.others.push_back(c);
   }
   for (const Patch& patch : level.patches) moves.groups.push_back(patch.groups);
   return moves;

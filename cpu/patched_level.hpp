@@ -53,22 +53,26 @@ enum StoredKind : std::uint16_t {
   kHeldPassed,       ///< from one cell above level 0
   kGeneral,          ///< from cells of level 0, or two children have one octant; or a loose cell
   kGeneralPassed,    ///< the same from one cell
-  kOfFinest = 16,    ///< and on, in twos: from one cell of level 0 of some kind, or from eight
+  kOfFinest = 16,    ///< and on: from one cell of level 0 of some kind, or from 8, 64, ... of them
   kNoCells = 0xFFFF  ///< in every level: a group that no patch has
 };
 constexpr bool is_of_finest(std::uint16_t kind) { return kind >= kOfFinest && kind != kNoCells; }
-/// From eight cells of level 0 of one kind, one an octant; no corner hangs. Of one rotation they
-/// would be an element of twice the side.
-constexpr bool is_of_eight(std::uint16_t kind) { return is_of_finest(kind) && kind % 2 != 0; }
+/// How many times the side is that of the cells of level 0, as a power of two: a cell is from one
+/// cell of the level before, or from eight of one kind, one an octant, and then no corner hangs. Of
+/// one rotation these would be an element of twice the side.
+inline constexpr int kMostDoublings = 7;
+constexpr int doublings(std::uint16_t kind) { return (kind - kOfFinest) % (kMostDoublings + 1); }
+constexpr bool is_of_eight(std::uint16_t kind) { return is_of_finest(kind) && doublings(kind) > 0; }
 /// The kind of the cells of level 0 that it is from.
 constexpr std::uint16_t finest_kind(std::uint16_t kind) {
-  return static_cast<std::uint16_t>((kind - kOfFinest) / 2);
+  return static_cast<std::uint16_t>((kind - kOfFinest) / (kMostDoublings + 1));
 }
-constexpr std::uint16_t kind_of_finest(std::uint16_t finest, bool eight) {
-  return static_cast<std::uint16_t>(kOfFinest + 2 * finest + (eight ? 1 : 0));
+constexpr std::uint16_t kind_of_finest(std::uint16_t finest, int doublings) {
+  return static_cast<std::uint16_t>(kOfFinest + (kMostDoublings + 1) * finest + doublings);
 }
-inline constexpr std::size_t kMostKinds = (kNoCells - kOfFinest) / 2;  // of cells of level 0
-static_assert(kOfFinest % 2 == 0 && is_of_finest(kind_of_finest(kMostKinds - 1, true)));
+/// Of cells of level 0.
+inline constexpr std::size_t kMostKinds = (kNoCells - kOfFinest) / (kMostDoublings + 1);
+static_assert(is_of_eight(kind_of_finest(kMostKinds - 1, kMostDoublings)));
 /// Whether cells of level 0 below are partly held, or matrices are made as if they were.
 constexpr bool is_held(std::uint16_t kind) { return kind >= kHeldMerged && kind < kOfFinest; }
 
@@ -292,11 +296,11 @@ struct PatchMoves {
   struct Move {
     std::int32_t from, to;
   };
-  std::vector<Move> vertices;      ///< packed numbers
-  std::vector<Move> cells;         ///< lane (of a new cell: that of its origin), and the cell
-  std::vector<Range> groups;       ///< whose lanes are others now
-  std::vector<std::int32_t> held;  ///< cells that are new or have another HeldCell
-  std::vector<char> tiles;         ///< whether vertices of a tile are others, or take other values
+  std::vector<Move> vertices;        ///< packed numbers
+  std::vector<Move> cells;           ///< lane (of a new cell: that of its origin), and the cell
+  std::vector<Range> groups;         ///< whose lanes are others now
+  std::vector<std::int32_t> others;  ///< cells that are new, or have another HeldCell or kind
+  std::vector<char> tiles;  ///< whether vertices of a tile are others, or take other values
 
   void touch(std::int32_t packed) {
     const auto tile = static_cast<std::size_t>(packed / kGroup);

@@ -4,8 +4,8 @@
 // cells of a group side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
-// Turned  Where cells of level 1 are one element each, their rotations are stored instead: cells of
-//         level 0 that are passed on, and where the backend says so, eight of them as one.
+// Turned  Where cells are one element each, their rotations are stored instead: cells of level 0
+//         that are passed on, and where the backend says so, eight elements as one.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
 //         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
 //         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.

@@ -12,6 +12,7 @@
 
 #include "core/simulation.hpp"
 #include "core/solve/linear_solver.hpp"
+#include "tests/support/as_one.hpp"
 #include "tests/support/physics.hpp"
 #include "tests/support/solves.hpp"
 
@@ -19,6 +20,7 @@ namespace kerf {
 namespace {
 
 using oracle::Vector;
+using test::AsOne;
 using test::Loaded;
 using test::Problem;
 using test::ProblemOptions;
@@ -46,13 +48,14 @@ void turn_to(const Problem& p, Backend& backend, const std::vector<double>& rota
   }
 }
 
-/// Products, and what a sweep of smoothing leaves, of level 0 as in the first reference and of all
-/// others as in the second.
-void expect_operators_alike(const Problem& p, const Backend& finest, const Backend& coarse,
-                            Backend& mixed) {
+/// Products, and what a sweep of smoothing leaves, of level 0 as in the first reference, and of the
+/// others as in the second with the rotations for each.
+void expect_operators_alike(const Problem& p, Backend& finest, Backend& coarse,
+                            const std::vector<std::vector<double>>& rotations, Backend& mixed) {
   for (int l = 0; l < p.levels(); ++l) {
     SCOPED_TRACE(::testing::Message() << "level " << l);
-    auto& exact = const_cast<Backend&>(l == 0 ? finest : coarse);
+    Backend& exact = l == 0 ? finest : coarse;
+    if (l > 0) turn_to(p, coarse, rotations[static_cast<std::size_t>(l)]);
     const Vector x = p.free_vector(l, 7), f = p.free_vector(l, 8);
     for (Backend* backend : {&exact, &mixed}) {
       test::write(*backend, l, kKrylovX, x);
@@ -74,48 +77,7 @@ void expect_operators_alike(const Problem& p, const Backend& finest, const Backe
   }
 }
 
-/// Whether the children of a cell of level 1 may be one element: eight of one kind, none held, and
-/// no corner hangs.
-bool are_eight_alike(const Problem& p, std::int32_t c) {
-  const Level &fine = p.hierarchy.levels[0], &level = p.hierarchy.levels[1];
-  const auto children = level.children_of(c);
-  if (children.size() != 8 || kernels::has_hanging(level.fold[c])) return false;
-  const auto& first = p.hierarchy.values[children[0]];
-  return std::all_of(children.begin(), children.end(), [&](std::int32_t child) {
-    const auto& values = p.hierarchy.values[child];
-    return fine.size_log2[child] == fine.size_log2[children[0]] &&
-           values.material == first.material && values.stiffness == first.stiffness &&
-           std::all_of(fine.slots[child].begin(), fine.slots[child].end(),
-                       [&](std::int32_t v) { return fine.fixed[v] == 0; });
-  });
-}
-
-/// The rotations with that of each cell in an eight as their mean. `farthest`: radians from it.
-std::vector<double> as_one(const Problem& p, const std::vector<double>& rotations, int& eights,
-                           double& farthest) {
-  std::vector<double> out = rotations;
-  eights = 0;
-  farthest = 0;
-  for (std::int32_t c = 0; c < p.hierarchy.levels[1].cells(); ++c) {
-    if (!are_eight_alike(p, c)) continue;
-    ++eights;
-    const auto children = p.hierarchy.levels[1].children_of(c);
-    const auto at = [&](std::int32_t child) {
-      return Eigen::Map<const Eigen::Vector4d>(&rotations[4 * static_cast<std::size_t>(child)]);
-    };
-    Eigen::Vector4d mean = Eigen::Vector4d::Zero();
-    for (const std::int32_t child : children)
-      mean += at(child).dot(at(children[0])) < 0 ? Eigen::Vector4d(-at(child)) : at(child);
-    mean.normalize();
-    for (const std::int32_t child : children) {
-      farthest = std::max(farthest, 2 * std::acos(std::min(1.0, std::abs(mean.dot(at(child))))));
-      std::copy_n(mean.data(), 4, out.begin() + 4 * std::ptrdiff_t{child});
-    }
-  }
-  return out;
-}
-
-// Where eight cells have nearly one rotation, level 1 has the matrix of their mean.
+// Where eight cells have nearly one rotation, the next level has the matrix of their mean.
 TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
   const Problem p = cut_octree();
   const Vector u = p.deformation();
@@ -125,18 +87,17 @@ TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
   ASSERT_GE(p.levels(), 3);
   std::vector<double> rotations(4 * p.hierarchy.values.size());
   exact.backend->read_rotations(rotations);
-  int eights = 0;
-  double farthest = 0;
-  turn_to(p, *mean.backend, as_one(p, rotations, eights, farthest));
-  EXPECT_GT(eights, 4);
-  EXPECT_LT(farthest, 0.1);
-  expect_operators_alike(p, *exact.backend, *mean.backend, *mixed.backend);
+  const AsOne ones = test::as_one(p, rotations);
+  EXPECT_GT(ones.eights[1], 4);
+  EXPECT_LT(*std::max_element(ones.farthest.begin(), ones.farthest.end()), 0.1);
+  expect_operators_alike(p, *exact.backend, *mean.backend, ones.rotations, *mixed.backend);
 }
 
-// Rotations that differ from parent to parent, and by a little or somewhat more within one; every
-// other one as its negative, which is the same.
+// Rotations that differ from parent to parent, and by a little or somewhat more within one, or in
+// one of the parents; every other one as its negative, which is the same.
 TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
   ProblemOptions options;
+  options.holds = test::Holds::one_side;
   options.coarsest_vertices = 60;
   options.materials = 1;
   options.with_oracle = false;
@@ -146,13 +107,15 @@ TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
     const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
     const Loaded mean(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
     const Loaded mixed(p, test::make_backend("mixed"), kDynamic, {}, p.deformation());
-    for (const double off : {0.0, 0.09, 0.11}) {
-      SCOPED_TRACE(::testing::Message() << off << " radians, refinement " << refinement);
+    for (const auto& [off, slope] : {std::pair{0.0, 0.01}, std::pair{0.09, 0.01},
+                                     std::pair{0.11, 0.01}, std::pair{0.0, 0.05}}) {
+      SCOPED_TRACE(::testing::Message()
+                   << off << " and " << slope << " radians, refinement " << refinement);
       const Level& finest = p.hierarchy.levels[0];
       std::vector<double> rotations;
       for (std::int32_t c = 0; c < finest.cells(); ++c) {
         const Vec3i& at = finest.corner[c];
-        const double angle = 0.4 + 0.01 * (at[0] / 2 + 2 * (at[1] / 2) + 3 * (at[2] / 2)) +
+        const double angle = 0.4 + slope * (at[0] / 2 + 2 * (at[1] / 2) + 3 * (at[2] / 2)) +
                              (at[0] % 2 == 0 ? off : -off);
         const double sign = at[1] % 2 == 0 ? 1 : -1;
         for (const double part :
@@ -161,15 +124,18 @@ TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
       }
       turn_to(p, *exact.backend, rotations);
       turn_to(p, *mixed.backend, rotations);
-      int eights = 0;
-      double farthest = 0;
-      turn_to(p, *mean.backend, as_one(p, rotations, eights, farthest));
-      EXPECT_GT(eights, 100);
-      EXPECT_NEAR(farthest, off, 1e-6);
-      const Backend& coarse = off < 0.1 ? *mean.backend : *exact.backend;
-      expect_operators_alike(p, *exact.backend, coarse, *mixed.backend);
+      const AsOne ones = test::as_one(p, rotations, 0.1);
+      EXPECT_GT(ones.eights[1], 100);
+      EXPECT_NEAR(ones.farthest[1], off, 1e-6);
+      if (off < 0.1) {
+        EXPECT_GT(ones.eights[2], 20);
+        EXPECT_NEAR(ones.farthest[2], 3 * slope, 1e-6);
+        EXPECT_EQ(ones.eights[3] > 0, slope < 0.05 && refinement == 0);
+      }
+      expect_operators_alike(p, *exact.backend, *mean.backend, ones.rotations, *mixed.backend);
       if (off == 0) continue;  // else the two references differ, so that one of them is not met
       test::write(*exact.backend, 1, kKrylovX, p.free_vector(1, 7));
+      turn_to(p, *mean.backend, test::as_one(p, rotations).rotations[1]);
       test::write(*mean.backend, 1, kKrylovX, p.free_vector(1, 7));
       exact.backend->apply(1, kKrylovX, kKrylovV);
       mean.backend->apply(1, kKrylovX, kKrylovV);
@@ -203,7 +169,8 @@ TEST(MixedPrecision, CoarseOperatorsAreExactForOneRotationAndForMany) {
       }
       turn_to(p, *exact.backend, rotations);
       turn_to(p, *mixed.backend, rotations);
-      expect_operators_alike(p, *exact.backend, *exact.backend, *mixed.backend);
+      const std::vector<std::vector<double>> same(p.hierarchy.levels.size(), rotations);
+      expect_operators_alike(p, *exact.backend, *exact.backend, same, *mixed.backend);
     }
   }
 }

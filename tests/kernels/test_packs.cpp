@@ -292,18 +292,28 @@ TEST(Codes, UpperHalvesComeBackAndAreNotBelow) {
 /// Symmetric matrices of the lanes of a tile: entries in the order of kernels::Sym3.
 using TileBlocks = std::array<std::array<double, 6>, cpu::kGroup>;
 
+/// Two of four tiles as twins.
 template <class S>
 cpu::InverseDiagonals<S> inverse_diagonals_of(const std::vector<TileBlocks>& tiles) {
   cpu::InverseDiagonals<S> out;
   out.assign(tiles.size(), false);
-  for (std::size_t t = 0; t < tiles.size(); ++t)
-    for (int first = 0; first < cpu::kGroup; first += Pack<S>::kLanes) {
+  for (int first = 0; first < cpu::kGroup; first += Pack<S>::kLanes) {
+    const auto blocks = [&](std::size_t t) {
       Pack<S> e[6];
       for (int i = 0; i < 6; ++i)
         for (int k = 0; k < Pack<S>::kLanes; ++k)
           e[i].set(k, static_cast<S>(tiles[t][first + k][i]));
-      out.store(t, first, {e[0], e[1], e[2], e[3], e[4], e[5]});
+      return kernels::Sym3<Pack<S>>{e[0], e[1], e[2], e[3], e[4], e[5]};
+    };
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+      if (t % 4 == 1 && t + 1 < tiles.size()) {
+        out.store(t, first, cpu::twins(blocks(t), blocks(t + 1)));
+        ++t;
+      } else {
+        out.store(t, first, blocks(t));
+      }
     }
+  }
   return out;
 }
 

@@ -229,11 +229,18 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
     }
     ASSERT_EQ(l.held[c], wholly ? cpu::kWhollyHeld : partly ? cpu::kPartlyHeld : cpu::kFree);
     const std::uint16_t kind = l.kind[lane / kGroup];
+    // As the levels above level 0 number kinds.
+    const auto kind_of = [&](std::int32_t child) {
+      const std::uint16_t of = finer.kind[finer.lane[child] / kGroup];
+      return finer.children.empty() ? cpu::kind_of_finest(of, 0) : of;
+    };
     if (cpu::is_of_finest(kind)) {
-      ASSERT_TRUE(finer.children.empty());
       std::set<int> octants;
       for (const std::int32_t child : l.level->children_of(c)) {
-        EXPECT_EQ(cpu::finest_kind(kind), finer.kind[finer.lane[child] / kGroup]);
+        ASSERT_TRUE(cpu::is_of_finest(kind_of(child)));
+        EXPECT_EQ(cpu::finest_kind(kind), cpu::finest_kind(kind_of(child)));
+        EXPECT_EQ(cpu::doublings(kind),
+                  cpu::doublings(kind_of(child)) + (cpu::is_of_eight(kind) ? 1 : 0));
         EXPECT_EQ(finer.level->place[child] == Level::kPassed, !cpu::is_of_eight(kind));
         octants.insert(finer.level->place[child] % 8);
       }
@@ -241,12 +248,12 @@ inline void expect_children(const PatchedLevel& finer, const PatchedLevel& l) {
       EXPECT_EQ(octants.size(), l.level->children_of(c).size());
       EXPECT_FALSE(cpu::is_of_eight(kind) && kernels::has_hanging(l.level->fold[c]));
     }
-    bool eight = finer.children.empty() && l.held[c] == cpu::kFree &&
-                 l.level->children_of(c).size() == 8 && !kernels::has_hanging(l.level->fold[c]) &&
-                 kind != cpu::kGeneral;
+    bool eight = l.held[c] == cpu::kFree && l.level->children_of(c).size() == 8 &&
+                 !kernels::has_hanging(l.level->fold[c]) && kind != cpu::kGeneral;
     std::set<std::pair<int, int>> kinds, places;
     for (const std::int32_t child : l.level->children_of(c)) {
-      kinds.insert({finer.level->size_log2[child], finer.kind[finer.lane[child] / kGroup]});
+      kinds.insert({finer.level->size_log2[child], kind_of(child)});
+      eight = eight && cpu::is_of_finest(kind_of(child));
       places.insert({finer.level->place[child] % 8, 0});
     }
     eight = eight && kinds.size() == 1 && places.size() == 8;
