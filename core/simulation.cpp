@@ -82,7 +82,6 @@ struct Simulation::Impl {
   void apply_cut(const DueCut& due, StepReport& report);
   std::array<std::pair<int, bool>, 3> state_vectors() const;
   double natural_time() const;
-  void copy_state(const StateVectors& from, const StateVectors& to);
   void step_back();
   void warn_of_pieces();
   std::vector<double> read_vector(int x) const;
@@ -97,7 +96,7 @@ struct Simulation::Impl {
   CutSchedule schedule;
   LinearSolver solver;
   std::unique_ptr<Structure> structure;
-  StateVectors state, before_step;
+  StateVectors state;
   std::unique_ptr<Motion> motion;
   std::unique_ptr<Equilibrium> equilibrium;
   std::unique_ptr<Surface> surface;       // null: none asked for
@@ -123,8 +122,6 @@ void Simulation::Impl::start() {
   state.memory = backend->add_vector();
   state.external = backend->add_vector();
   if (setup.time.mode == TimeMode::dynamic) {
-    before_step.displacement = backend->add_rough_vector();
-    before_step.velocity = backend->add_rough_vector();
     motion =
         std::make_unique<Motion>(*backend, solver, setup.time, setup.material, setup.solver, state);
   } else {
@@ -359,21 +356,15 @@ void Simulation::Impl::update_backend() {
   }
 }
 
-void Simulation::Impl::copy_state(const StateVectors& from, const StateVectors& to) {
-  backend->copy(0, from.displacement, to.displacement);
-  backend->copy(0, from.velocity, to.velocity);
-}
-
 // The last good state is worth more than one that is no number; the run ends with it, so that the
 // acceleration is not asked for again.
 void Simulation::Impl::step_back() {
-  copy_state(before_step, state);
   backend->zero(0, state.memory);
   backend->rotate_cells(state.displacement);
   stopped = true;
   warnings.push_back(
       text("the motion blew up in step ", steps,
-           "; the run ends with the state before it. Shorten time.step, tighten "
+           "; the run ends with the last state that was finite. Shorten time.step, tighten "
            "solver.tolerance, or check that sizes, moduli and loads are in SI units"));
 }
 
@@ -404,7 +395,6 @@ StepReport Simulation::Impl::step() {
   for (const DueCut& due : schedule.due(steps)) apply_cut(due, report);
   report.pieces = structure->pieces();
 
-  if (motion) copy_state(state, before_step);
   const NonlinearStats stats = solve_step();
   prescribed = false;
   ++steps;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace kerf {
 namespace {
@@ -28,6 +30,7 @@ Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
       increment_(backend.add_vector()),
       work_(solver.spare()[0]),
       scratch_(solver.spare()[1]),
+      far_{backend.add_rough_vector(), backend.add_rough_vector()},
       returned_(static_cast<std::size_t>(setup.rotation_updates), 1.0) {}
 
 double Motion::velocity_factor() const {
@@ -91,6 +94,50 @@ void Motion::begin_step() {
   backend_.copy(0, state_.displacement, state_.memory);
 }
 
+/// Displacement and velocity by so many increments.
+void Motion::move(double by) {
+  backend_.add(0, by, increment_, state_.displacement);
+  backend_.add(0, by * velocity_factor(), increment_, state_.velocity);
+}
+
+/// Before the increment is added. There is no need for a copy, unless the way back would lose more
+/// than a digit.
+void Motion::keep_way_back() {
+  constexpr double kFar = 100;  // squared
+  const double step = backend_.dot(0, increment_, increment_);
+  const double size = backend_.dot(0, state_.displacement, state_.displacement);
+  const bool was_far =
+      std::exchange(is_far_, !std::isfinite(step) || (size > 0 && step > kFar * size));
+  if (!is_far_) {
+    if (was_far)
+      for (const int x : {far_.displacement, far_.velocity}) backend_.release(x);
+    return;
+  }
+  backend_.copy(0, state_.displacement, far_.displacement);
+  backend_.copy(0, state_.velocity, far_.velocity);
+}
+
+void Motion::go_back() {
+  if (!is_far_) return move(-1);
+  backend_.copy(0, far_.displacement, state_.displacement);
+  backend_.copy(0, far_.velocity, state_.velocity);
+}
+
+// Overflow: nothing further would be a number. `updates`: that were added; the state before the
+// first one is the guess. Of Newmark its velocity is (1 - gamma / beta) v_n + dt (1 - gamma / (2
+// beta)) a_n, of the central scheme half of the mean over the step before.
+NonlinearStats Motion::lost(NonlinearStats stats, int updates, bool last_is_lost) {
+  static_assert(kGamma == 2 * kBeta);
+  if (last_is_lost && updates > 0) {
+    go_back();
+    --updates;
+  }
+  const double factor = time_.scheme == TimeScheme::newmark ? -1 : 2;
+  if (updates == 0) backend_.combine(0, factor, state_.velocity, 0, state_.velocity);
+  stats.residual = std::numeric_limits<double>::infinity();
+  return stats;
+}
+
 double Motion::residual(int out) {
   const OperatorScale damping{material_.stiffness_damping, material_.mass_damping};
   const double external = backend_.dot(0, state_.external, state_.external);
@@ -114,6 +161,7 @@ NonlinearStats Motion::step() {
   for (int update = 0; update < setup_.rotation_updates; ++update) {
     backend_.rotate_cells(state_.displacement);
     const double before = residual(right_);
+    if (!std::isfinite(before)) return lost(stats, update, true);
     if (update == 0) reference = before;  // later ones correct a remainder
     if (previous > 0) returned_[update - 1] = before / previous;
     previous = before;
@@ -128,16 +176,15 @@ NonlinearStats Motion::step() {
     stats.linear_residual = solve.residual;
     stats.converged = stats.converged && solve.converged;
     ++stats.rotation_updates;
-    if (!std::isfinite(solve.residual)) {  // overflow: nothing below would be a number
-      stats.residual = solve.residual;
-      return stats;
-    }
-    backend_.add(0, 1, increment_, state_.displacement);
-    backend_.add(0, velocity_factor(), increment_, state_.velocity);
+    if (!std::isfinite(solve.residual)) return lost(stats, update, false);
+    keep_way_back();
+    move(1);
     backend_.add(0, acceleration_factor(), increment_, acceleration_);
   }
   backend_.rotate_cells(state_.displacement);
   const double left = residual(right_);
+  if (!std::isfinite(left) || !std::isfinite(largest_force_))
+    return lost(stats, setup_.rotation_updates, true);
   stats.residual = largest_force_ > 0 ? left / largest_force_ : 0;
   return stats;
 }

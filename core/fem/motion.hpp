@@ -37,6 +37,9 @@ class Motion {
 
   /// Acceleration (or the displacement before) that fits displacement and velocity at the start.
   void start();
+  /// Where forces or solutions stop being numbers, stats.residual is not finite, and displacement
+  /// and velocity are those of the last iterate that was finite: before the first update those of
+  /// the step before. The acceleration is then of no use.
   NonlinearStats step();
 
  private:
@@ -44,6 +47,10 @@ class Motion {
   double velocity_factor() const;
   double acceleration_factor() const;
   void begin_step();
+  void move(double by);
+  void keep_way_back();
+  void go_back();
+  NonlinearStats lost(NonlinearStats stats, int updates, bool last_is_lost);
   /// external - elastic - damping - inertia, of the current iterate; returns its norm.
   double residual(int out);
 
@@ -54,6 +61,8 @@ class Motion {
   SolverSetup setup_;
   StateVectors state_;
   int acceleration_, right_, increment_, work_, scratch_;
+  StateVectors far_;  // displacement and velocity before the last update, if it went far
+  bool is_far_ = false;
   std::vector<double> returned_;  // per update: the residual after it over that before it, when the
                                   // rotations had moved, in the last step
   double largest_force_ = 0;      // of the terms of the last residual

@@ -9,6 +9,9 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <limits>
+#include <string>
+#include <utility>
 
 #include "core/body/cut.hpp"
 #include "core/fem/motion.hpp"
@@ -274,6 +277,89 @@ void expect_close(const std::vector<double>& found, const std::vector<double>& e
   ASSERT_EQ(found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i)
     ASSERT_NEAR(found[i], expected[i], kSteps * std::abs(scale)) << "step " << i + 1;
+}
+
+struct Ending {
+  const char* name;
+  TimeScheme scheme;
+  double gravity;     // m/s^2
+  bool in_an_update;  // else before the first one
+};
+class BlowsUp : public testing::TestWithParam<Ending> {};
+
+// Squares of forces come to the end of the numbers. What is left is the step before, or the last
+// update that was finite.
+TEST_P(BlowsUp, AndLeavesTheLastStateThatWasFinite) {
+  SimulationSetup setup = falling_ball(GetParam().scheme);
+  setup.supports = {{{{-1, -1, -1}, {0.3, 2, 2}}, {}, {true, true, true}}};
+  setup.loads = {Gravity{{0, -GetParam().gravity, 0}}};
+  setup.solver.tolerance = 1e-6;
+  setup.time.duration = 1;
+  Simulation simulation(setup, test::cpu());
+  Snapshot last = simulation.snapshot(), before = last;  // step before: u_n; and before that
+  StepReport report;
+  while (!simulation.finished()) {
+    before = std::exchange(last, simulation.snapshot());
+    report = simulation.step();
+  }
+
+  ASSERT_EQ(report.residual, std::numeric_limits<double>::max());
+  EXPECT_FALSE(report.converged);
+  EXPECT_GT(report.step, 1);
+  ASSERT_FALSE(simulation.warnings().empty());
+  EXPECT_NE(simulation.warnings().back().find("blew up"), std::string::npos);
+  EXPECT_EQ(report.rotation_updates > 0, GetParam().in_an_update);
+  const Snapshot s = simulation.snapshot();
+  double moved = 0, size = 0, speed = 0;
+  for (std::size_t i = 0; i < s.points.size(); ++i) {
+    moved = std::max(moved, norm(s.displacement[i] - last.displacement[i]));
+    size = std::max(size, norm(s.displacement[i]));
+    speed = std::max(speed, norm(s.velocity[i]));
+  }
+  ASSERT_TRUE(std::isfinite(size) && std::isfinite(speed));
+  EXPECT_GT(size, 0);
+  EXPECT_EQ(moved > 0, GetParam().in_an_update);
+  const double dt = setup.time.step;
+  for (std::size_t i = 0; i < s.points.size(); ++i) {
+    const bool newmark = GetParam().scheme == TimeScheme::newmark;
+    const Vec3d since = s.displacement[i] - before.displacement[i];
+    const Vec3d expected =
+        newmark ? last.velocity[i] : (GetParam().in_an_update ? 0.5 / dt : 1 / dt) * since;
+    ASSERT_LT(norm(s.velocity[i] - expected), kSteps * speed);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BlowsUp,
+                         testing::Values(Ending{"newmark", TimeScheme::newmark, 1e152, false},
+                                         Ending{"newmark_later", TimeScheme::newmark, 5e151, false},
+                                         Ending{"central", TimeScheme::central, 1e152, false},
+                                         Ending{"central_update", TimeScheme::central, 5e151,
+                                                true}),
+                         [](const auto& ending) { return ending.param.name; });
+
+// The first update moves the body by so much that, with the rotations of that, no force is a
+// number; and what was there would drown in it.
+TEST(BlowsUp, FromAnIncrementThatWentFar) {
+  FreeBody body(10, {}, 1);
+  const auto field = [&](double size) {
+    return test::at_vertices(body.octree, body.level(), [&](const Vec3d& x) {
+      return size * Vec3d{std::sin(9 * x.x), std::cos(7 * x.x), 2 + x.y};
+    });
+  };
+  const std::vector<double> u = field(1e-7), v = field(1e-6);
+  body.backend->write(0, body.state.displacement, u);
+  body.backend->write(0, body.state.velocity, v);
+  body.motion->start();
+  body.backend->write(0, body.state.external, field(1e151));
+
+  const NonlinearStats stats = body.motion->step();
+
+  EXPECT_EQ(stats.residual, std::numeric_limits<double>::infinity());
+  ASSERT_EQ(stats.rotation_updates, 1);
+  const std::size_t n = body.level().point.size();
+  EXPECT_EQ(test::read(*body.backend, body.state.displacement, n), u);
+  const std::vector<double> velocity = test::read(*body.backend, body.state.velocity, n);
+  for (std::size_t i = 0; i < v.size(); ++i) EXPECT_NEAR(velocity[i], v[i], 1e-6 * kSteps);
 }
 
 TEST(Newmark, OfOneDegreeOfFreedomHasItsDiscretePeriod) {
