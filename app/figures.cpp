@@ -38,14 +38,14 @@ Content content_of(const LinkedOctree& body, const Hierarchy& hierarchy, std::si
   for (const std::uint8_t log2 : hierarchy.levels[0].size_log2)
     content.volume.push_back(cube(1 << log2));
   for (std::size_t fine = 0; fine < level; ++fine) {
-    const auto coarse_cells = static_cast<std::size_t>(hierarchy.levels[fine + 1].cells());
-    const std::vector<std::int32_t>& parent = hierarchy.levels[fine].parent;
-    Content above{std::vector<double>(coarse_cells, 0),
-                  std::vector<std::int32_t>(coarse_cells, -1)};
-    for (std::size_t c = 0; c < parent.size(); ++c) {
-      const auto p = static_cast<std::size_t>(parent[c]);
-      above.volume[p] += content.volume[c];
-      if (above.piece[p] < 0) above.piece[p] = content.piece[c];
+    const Level& coarse = hierarchy.levels[fine + 1];
+    Content above;
+    for (std::int32_t p = 0; p < coarse.cells(); ++p) {
+      const auto children = coarse.children_of(p);
+      above.piece.push_back(content.piece[static_cast<std::size_t>(children[0])]);
+      above.volume.push_back(0);
+      for (const std::int32_t c : children)
+        above.volume.back() += content.volume[static_cast<std::size_t>(c)];
     }
     content = std::move(above);
   }
@@ -101,11 +101,11 @@ LevelFigure level_figure(const LinkedOctree& body, const Hierarchy& hierarchy, s
 
 LinksFigure links_figure(const LinkedOctree& body) {
   LinksFigure out;
-  const std::vector<std::int32_t>& leaves = body.leaves();
+  const LeafNodes& leaves = body.leaves();
   const auto centre = [&](std::int32_t leaf) {
     const auto& node =
         body.nodes()[static_cast<std::size_t>(leaves[static_cast<std::size_t>(leaf)])];
-    const auto corners = rest_corners(body.lattice(), node.corner, 1 << node.size_log2);
+    const auto corners = rest_corners(body.lattice(), node.corner(), 1 << node.size_log2);
     return 0.5 * (corners[0] + corners[7]);
   };
   for (const LeafLink& link : leaf_links(body)) {

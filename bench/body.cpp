@@ -118,7 +118,7 @@ std::uint64_t hash_of(const std::vector<double>& values) {
 std::uint64_t hash_of(const Hierarchy& hierarchy) {
   Hash hash;
   for (const Level& level : hierarchy.levels) {
-    hash.add(level.corner);
+    hash.add(std::vector<Vec3i>(level.corner.begin(), level.corner.end()));
     hash.add(level.size_log2);
     hash.add(level.parent);
     hash.add(level.place);

@@ -146,6 +146,7 @@ void Simulation::Impl::start() {
     const AddTime timer(clock.step);
     motion->start();
   }
+  if (surface && setup.cuts.empty()) surface->forget_changes();
   move_surface();
   if (equilibrium)
     equilibrium->on_progress([this](int update, double residual) {
@@ -184,9 +185,10 @@ void Simulation::Impl::load_structure() {
     backend->load(hierarchy());
     backend->write(0, state.external, structure->external().on_all(hierarchy()));
     backend->mask(0, state.external);
-    return_freed_memory();
   }
   solver.set_structure(hierarchy());
+  structure->forget_transfers();
+  return_freed_memory();
 }
 
 void Simulation::Impl::change_surface(const CutEvent& event) {
@@ -356,8 +358,8 @@ void Simulation::Impl::update_backend() {
   }
 }
 
-// The last good state is worth more than one that is no number; the run ends with it, so that the
-// acceleration is not asked for again.
+// The last finite state, perhaps of an update that others were to follow, is worth more than one
+// that is no number; the run ends with it, so that the acceleration is not asked for again.
 void Simulation::Impl::step_back() {
   backend->zero(0, state.memory);
   backend->rotate_cells(state.displacement);

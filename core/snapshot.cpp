@@ -55,14 +55,14 @@ void place_corners(const Lattice& lattice, const Level& level, std::int32_t cell
 }
 
 void add_boundary(const LinkedOctree& body, Snapshot& out) {
-  const std::vector<std::int32_t>& leaves = body.leaves();
+  const LeafNodes& leaves = body.leaves();
   for (std::size_t c = 0; c < leaves.size(); ++c) {
     const LinkedOctree::Node& leaf = body.nodes()[leaves[c]];
     if (leaf.size_log2 != 0) continue;  // larger leaves are linked on all sides
     for (int face = 0; face < 6; ++face) {
       if (!((leaf.cut_mask >> face) & 1)) continue;
       const int axis = face / 2, side = face % 2;
-      Vec3i lower = leaf.corner;
+      Vec3i lower = leaf.corner();
       lower[axis] -= 1 - side;
       const LinkCut* record = body.record(lower, axis);
       // This cell is the lower end of the link on its high side.

@@ -42,7 +42,13 @@ Structure::Structure(const SimulationSetup& setup, const LinkedOctree& body, boo
   merge_into(opened_, opened_cells(body));
   hold_again(body);
   build_coarse_levels(hierarchy_, options());
-  if (setup.cuts.empty() && !reads_incidences) hierarchy_.forget_neighbours();
+  if (reads_incidences || !setup.cuts.empty()) return;
+  hierarchy_.forget_neighbours();
+  labels_.forget_changes();
+}
+
+void Structure::forget_transfers() {
+  if (!hierarchy_.has_neighbours()) hierarchy_.forget_transfers();
 }
 
 HierarchyOptions Structure::options() const {

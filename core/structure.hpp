@@ -35,6 +35,8 @@ class Structure {
   const Hierarchy& hierarchy() const { return hierarchy_; }
   const Level& finest() const { return hierarchy_.levels[0]; }
   void pack() { hierarchy_.pack(); }
+  /// After a load: gives back what is not read again where no blade is to come.
+  void forget_transfers();
   std::size_t pieces() const { return labels_.count(); }
   std::vector<std::int32_t> piece_of_cells() const { return labels_.by_first_cell(); }
   const ExternalForce& external() const { return external_; }

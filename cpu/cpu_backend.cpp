@@ -363,6 +363,7 @@ void CpuBackend::move_points(std::span<const BoundPoint> points, int displacemen
 
 void CpuBackend::surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
                                  std::span<Vec3d> normals) {
+  faces_.resize(surface.triangles.size());
   cpu::surface_normals(surface, positions, normals, faces_, threads_);
 }
 

@@ -173,7 +173,8 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
 }
 
 /// The mean rotations of eight cells each; false where the cosine of half the angle of one from its
-/// mean is less than `least`. `children`: [octant][kGroup], lanes of the cells, -1: none of them.
+/// mean is less than `least`. `children`: [octant][kGroup], lanes of the cells, -1 for all eight or
+/// none.
 template <class S, class Cells>
 bool mean_rotation(const Cells& cells, const std::int32_t* children, double least,
                    kernels::Quat<Pack<S>>& mean) {
@@ -194,12 +195,15 @@ bool mean_rotation(const Cells& cells, const std::int32_t* children, double leas
   });
   mean = kernels::normalised(mean);
   const P square = P(static_cast<S>(least * least));
+  alignas(kPackBytes) S absent[P::kLanes];  // the rotation of such a lane is anyone's
+  for (int k = 0; k < P::kLanes; ++k) absent[k] = children[k] < 0 ? S(1) : S(0);
+  const auto is_absent = load_pack(absent) > P(S(0));
   auto near = P(S(0)) < P(S(1));
   kernels::unrolled<8>([&](auto octant) {
     const P cosine = dot(mean, of[octant]);
     near = near && !(cosine * cosine < square);
   });
-  return all(near);
+  return all(near || is_absent);
 }
 
 }  // namespace kerf::cpu

@@ -23,8 +23,8 @@ FastBackend<S>::FastBackend(int threads, bool updates)
 
 template <class S>
 std::size_t FastBackend<S>::bytes() const {
-  std::size_t sum = bytes_of(partial_) + bytes_of(faces_) + rotations_.bytes() +
-                    bytes_of(exact_materials_) + bytes_of(single_materials_);
+  std::size_t sum = bytes_of(partial_) + rotations_.bytes() + bytes_of(exact_materials_) +
+                    bytes_of(single_materials_);
   for (const FastLevel<S>& level : levels_) {
     sum += level.patched.bytes() + level.matrices.bytes() + level.inverse_diagonals.bytes() +
            level.vectors.bytes();
@@ -75,6 +75,7 @@ void FastBackend<S>::load_coarsest() {
 
 template <class S>
 void FastBackend<S>::load(const Hierarchy& hierarchy) {
+  ensures(hierarchy.has_transfers(), "a hierarchy without transfers is loaded");
   hierarchy_ = &hierarchy;
   const bool follows = updates_ && hierarchy.has_neighbours();
   waiting_ = -1;

@@ -311,7 +311,8 @@ void FastBackend<S>::move_points(std::span<const BoundPoint> points, int displac
 template <class S>
 void FastBackend<S>::surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
                                      std::span<Vec3d> normals) {
-  cpu::surface_normals(surface, positions, normals, faces_, threads_);
+  const std::size_t faces = surface.triangles.size();
+  cpu::surface_normals(surface, positions, normals, {partial_sums<Vec3d>(faces), faces}, threads_);
 }
 
 template <class S>

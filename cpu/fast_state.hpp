@@ -335,10 +335,9 @@ class FastBackend final : public Backend {
   SlotTable<S> folds_{kernels::MassModel::consistent};
   std::vector<FastLevel<S>> levels_;
   std::vector<bool> exact_on_finest_ = std::vector<bool>(kLevelVectors, kIsDouble);
-  Array<double> partial_;     // of shared vertices: sums by copy, in the scalars of the sweep;
-                              // and what a level gives to the next
-  int waiting_ = -1;          // level whose solution is still to be corrected
-  std::vector<Vec3d> faces_;  // of the surface: area normals
+  Array<double> partial_;  // of shared vertices: sums by copy, in the scalars of the sweep;
+                           // what a level gives to the next; area normals of a surface
+  int waiting_ = -1;       // level whose solution is still to be corrected
   std::unique_ptr<AssembledLevel> coarsest_;
   FrontFactor<S> coarsest_factor_;
   bool factored_ = false;

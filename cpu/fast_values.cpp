@@ -121,7 +121,7 @@ void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first
 
 // Rotations of the cells of a level that are one element each, or may be. Eight elements of one
 // rotation are exactly one of twice the side. In single precision, where matrices only
-// precondition, nearly one rotation is enough.
+// precondition, nearly one rotation is enough: to the mean of each eight, on each level anew.
 template <class S>
 template <class Cells>
 void FastBackend<S>::turn(int level, const Cells& cells) {

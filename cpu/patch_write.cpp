@@ -35,6 +35,7 @@ void PatchedLevel::forget_rows() {
     kept.insert(kept.end(), corners.data() + kBlock * g, corners.data() + kBlock * (g + 1));
   }
   corners = std::move(kept);
+  if (children.empty()) vertex = {};  // others find by it what levels give to the next
 }
 
 void PatchWriter::write() {

@@ -179,6 +179,7 @@ class Patcher {
     if (held) return passed ? kHeldPassed : kHeldMerged;
     const std::uint16_t first = element_kind(children[0]);
     if (!is_of_finest(first)) return passed ? kPassed : kMerged;
+    ensures(!passed || doublings(first) == 0, "a cell from eight is passed on");
     if (passed) return first;
     const bool alike = std::all_of(children.begin(), children.end(), [&](std::int32_t child) {
       return element_kind(child) == first;

@@ -255,15 +255,16 @@ struct PatchedLevel {
     const std::size_t at = corners_at.empty() ? group : static_cast<std::size_t>(corners_at[group]);
     return corners.data() + 8 * kGroup * at;
   }
-  /// Where no cut is to come: groups in rows keep what is read of them, their heads.
+  /// Where no cut is to come: groups in rows keep what is read of them, their heads; and on level 0
+  /// nothing asks for `vertex`.
   void forget_rows();
   /// Whether the cells of a group are wholly held.
   bool idle(std::size_t group) const {
     return kinds.empty() ? kind[group] == kIdle : kinds[kind[group]].idle;
   }
   std::size_t groups() const { return cell.size() / kGroup; }
-  std::size_t vertices() const { return vertex.size(); }
-  std::size_t tiles() const { return vertex.size() / kGroup; }
+  std::size_t vertices() const { return fixed.size(); }
+  std::size_t tiles() const { return fixed.size() / kGroup; }
   void set_heads(std::size_t group);
   /// As if it had never had cells: of no patch, and in no sum.
   void empty_group(std::int32_t g);

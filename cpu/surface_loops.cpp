@@ -4,8 +4,7 @@
 namespace kerf::cpu {
 
 void surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
-                     std::span<Vec3d> normals, std::vector<Vec3d>& faces, int threads) {
-  faces.resize(surface.triangles.size());
+                     std::span<Vec3d> normals, std::span<Vec3d> faces, int threads) {
   for_points(surface.triangles.size(), threads, [&](std::int32_t t) {
     const auto& [a, b, c] = surface.triangles[t];
     faces[t] = kernels::area_normal(positions[a], positions[b], positions[c]);

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "core/levels/hierarchy.hpp"
 #include "core/surface/surface_view.hpp"
@@ -39,8 +38,8 @@ void move_points(const Level& level, std::span<const BoundPoint> points,
   });
 }
 
-/// Shapes  faces: room for the area normals, kept from call to call.
+/// Shapes  faces: room for the area normal of each triangle.
 void surface_normals(const SurfaceView& surface, std::span<const Vec3d> positions,
-                     std::span<Vec3d> normals, std::vector<Vec3d>& faces, int threads);
+                     std::span<Vec3d> normals, std::span<Vec3d> faces, int threads);
 
 }  // namespace kerf::cpu

@@ -112,12 +112,13 @@ CutBody duplicated_body(const Shape& shape) {
   build_coarse_levels(out.hierarchy, {1, kPartLevels + 1, true});
   ensures(out.hierarchy.levels.size() == kPartLevels + 1, "parts of cells need all levels below");
   Level level = std::move(out.hierarchy.levels.back());
-  const auto scale = [](Vec3i& p) {
+  const auto scaled = [](Vec3i p) {
     for (std::int32_t& x : p) x >>= kPartLevels;
+    return p;
   };
-  std::for_each(level.corner.begin(), level.corner.end(), scale);
-  std::for_each(level.point.begin(), level.point.end(), scale);
-  scale(out.lattice.size);
+  for (LatticePoints* points : {&level.corner, &level.point})
+    for (std::size_t i = 0; i < points->size(); ++i) points->set(i, scaled((*points)[i]));
+  out.lattice.size = scaled(out.lattice.size);
   for (std::uint8_t& log2 : level.size_log2) {
     ensures(log2 == kPartLevels, "cells of one size alone are left");
     log2 = 0;

@@ -16,12 +16,16 @@
 // Source  [DGW11] sections 4.1 and 4.2.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <unordered_map>
 #include <vector>
 
 #include "core/body/lattice.hpp"
+#include "core/body/lattice_points.hpp"
+#include "core/body/leaf_nodes.hpp"
 #include "core/body/voxelise.hpp"
 
 namespace kerf {
@@ -29,15 +33,26 @@ namespace kerf {
 class LinkedOctree {
  public:
   struct Node {
-    Vec3i corner{};                 ///< low corner on the finest lattice
-    std::int32_t first_child = -1;  ///< eight consecutive nodes, -1 for a leaf
-    std::int32_t number = -1;       ///< place in leaves() of a present leaf, -1 for others
-    std::uint8_t size_log2 = 0;     ///< side in finest cells: 1 << size_log2
-    std::uint8_t present = 0;       ///< 0: holds no material (deleted), never a leaf of the body
-    std::uint8_t material = 0;      ///< index of the material, of a present leaf
-    std::uint8_t cut_mask = 0;      ///< finest leaves: bit 2 a + s is set if the link along axis a
-                                    ///< to side s (0 low, 1 high) is disconnected
+    LatticePoint low{};
+    std::int32_t link = kNone;
+    std::uint8_t size_log2 = 0;  ///< side in finest cells: 1 << size_log2
+    std::uint8_t present = 0;    ///< 0: holds no material (deleted), never a leaf of the body
+    std::uint8_t material = 0;   ///< index of the material, of a present leaf
+    std::uint8_t cut_mask = 0;   ///< finest leaves: bit 2 a + s is set if the link along axis a
+                                 ///< to side s (0 low, 1 high) is disconnected
+
+    Vec3i corner() const { return low; }  ///< low corner on the finest lattice
+    bool is_leaf() const { return link < 0; }
+    /// Eight consecutive nodes; -1 for a leaf.
+    std::int32_t first_child() const { return std::max(link, -1); }
+    /// Place in leaves() of a present leaf; -1 for others.
+    std::int32_t number() const { return link < 0 && link != kNone ? -1 - link : -1; }
+    void set_number(std::int32_t number) { link = -1 - number; }
+
+   private:
+    static constexpr std::int32_t kNone = std::numeric_limits<std::int32_t>::min();
   };
+  static_assert(sizeof(Node) == 16);
 
   /// Coarse to fine: a node is split while it holds an end of a finest link that the surface
   /// crosses, or of a link between two materials; nodes without an inside centre are deleted.
@@ -50,11 +65,11 @@ class LinkedOctree {
   /// The nodes that are present leaves. Ascending by (size, z, y, x) of their corner at first; a
   /// leaf that is split leaves its place to its first child, and the other seven are appended. So a
   /// place in this list, the number of the leaf, stays that of the cells at one corner for ever.
-  const std::vector<std::int32_t>& leaves() const { return leaves_; }
+  const LeafNodes& leaves() const { return leaves_; }
   std::size_t leaf_count() const { return leaf_count_; }
   /// The place in leaves() of a node that is a present leaf; -1 for others.
   std::int32_t leaf_number(std::int32_t node) const {
-    return nodes_[static_cast<std::size_t>(node)].number;
+    return nodes_[static_cast<std::size_t>(node)].number();
   }
   /// Appends the number of every present leaf that touches the box of finest cells [low, high].
   void add_leaves_between(const Vec3i& low, const Vec3i& high,
@@ -109,7 +124,7 @@ class LinkedOctree {
   std::vector<std::int32_t> root_;  // dense grid of root nodes, -1: none
   std::vector<Node> nodes_;
   std::unordered_map<LinkKey, LinkCut> records_;
-  std::vector<std::int32_t> leaves_;  // empty during construction
+  LeafNodes leaves_;  // empty during construction
   std::size_t leaf_count_ = 0;
   std::vector<std::int32_t> splits_;
 };

@@ -30,7 +30,7 @@ Motion::Motion(Backend& backend, LinearSolver& solver, const TimeSetup& time,
       increment_(backend.add_vector()),
       work_(solver.spare()[0]),
       scratch_(solver.spare()[1]),
-      far_{backend.add_rough_vector(), backend.add_rough_vector()},
+      far_{backend.add_vector(), backend.add_vector()},
       returned_(static_cast<std::size_t>(setup.rotation_updates), 1.0) {}
 
 double Motion::velocity_factor() const {
@@ -65,6 +65,8 @@ void Motion::start() {
     backend_.add(0, -alpha, scratch_, right_);
   }
   for (const int x : {work_, scratch_}) backend_.release(x);
+  // Beyond the numbers: the first step finds that too, and is to leave the velocity as it was.
+  if (!std::isfinite(backend_.dot(0, increment_, increment_))) backend_.zero(0, increment_);
   if (time_.scheme == TimeScheme::newmark) {
     backend_.copy(0, increment_, acceleration_);
     return;
@@ -106,8 +108,7 @@ void Motion::keep_way_back() {
   constexpr double kFar = 100;  // squared
   const double step = backend_.dot(0, increment_, increment_);
   const double size = backend_.dot(0, state_.displacement, state_.displacement);
-  const bool was_far =
-      std::exchange(is_far_, !std::isfinite(step) || (size > 0 && step > kFar * size));
+  const bool was_far = std::exchange(is_far_, !std::isfinite(step) || step > kFar * size);
   if (!is_far_) {
     if (was_far)
       for (const int x : {far_.displacement, far_.velocity}) backend_.release(x);

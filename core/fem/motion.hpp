@@ -38,8 +38,8 @@ class Motion {
   /// Acceleration (or the displacement before) that fits displacement and velocity at the start.
   void start();
   /// Where forces or solutions stop being numbers, stats.residual is not finite, and displacement
-  /// and velocity are those of the last iterate that was finite: before the first update those of
-  /// the step before. The acceleration is then of no use.
+  /// and velocity are those of the last update that was finite; before the first one u_n, and v_n
+  /// (central: (u_n - u_{n-1}) / dt). The acceleration is then of no use.
   NonlinearStats step();
 
  private:

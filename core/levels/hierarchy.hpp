@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/body/lattice.hpp"
+#include "core/body/lattice_points.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/levels/rows.hpp"
 
@@ -32,15 +33,18 @@ struct Level {
   static constexpr std::uint8_t kPassed = 8;
 
   // Cells; built in the order of body.leaves() on level 0, ascending by (size, z, y, x) above.
-  std::vector<Vec3i> corner;            ///< low corner, finest lattice
+  LatticePoints corner;                 ///< low corner, finest lattice
   std::vector<std::uint8_t> size_log2;  ///< side, in finest cells: 1 << size_log2
-  std::vector<std::int32_t> parent;     ///< cell of the next level; empty on the coarsest
-  std::vector<std::uint8_t> place;      ///< octant in the parent, or kPassed; empty on the coarsest
-  std::vector<std::uint16_t> fold;      ///< bits 0-7 hanging corners, bits 8-10 octant
-  std::vector<std::array<std::int32_t, 8>> slots;  ///< the eight vertices
+  std::vector<std::int32_t> parent;  ///< cell of the next level; empty on the coarsest, and after
+                                     ///< Hierarchy::forget_transfers
+  std::vector<std::uint8_t> place;   ///< octant in the parent, or kPassed; empty on the coarsest
+  std::vector<std::uint16_t> fold;   ///< bits 0-7 hanging corners, bits 8-10 octant
+  /// The eight vertices. After Hierarchy::forget_transfers of the finest and the coarsest level
+  /// alone.
+  std::vector<std::array<std::int32_t, 8>> slots;
 
   // Vertices; built ascending by (z, y, x) of their grid point, then by their first cell.
-  std::vector<Vec3i> point;         ///< finest lattice
+  LatticePoints point;              ///< finest lattice
   std::vector<std::uint8_t> fixed;  ///< bit c: component c is held
 
   // Lists, to be read by the functions below: these arrays lie packed only after a build and
@@ -88,24 +92,30 @@ struct CellValues {
   friend bool operator==(const CellValues&, const CellValues&) = default;
 };
 
-/// One for each cell. Few are different, so that a cell costs two bytes.
+/// One for each cell. Few are different, so that a cell costs a byte, and two where there are more
+/// than 256.
 class CellValueList {
  public:
-  const CellValues& operator[](std::size_t cell) const { return kinds_[kind_[cell]]; }
-  std::size_t size() const { return kind_.size(); }
-  void reserve(std::size_t size) { kind_.reserve(size); }
-  void clear() { resize(0); }
-  void push_back(const CellValues& values) { kind_.push_back(kind_of(values)); }
-  void resize(std::size_t size, const CellValues& values = {}) {
-    kind_.resize(size, kind_of(values));
+  const CellValues& operator[](std::size_t cell) const {
+    return kinds_[low_[cell] + (is_wide_ ? 256U * high_[cell] : 0U)];
   }
-  void set(std::size_t cell, const CellValues& values) { kind_[cell] = kind_of(values); }
+  std::size_t size() const { return low_.size(); }
+  void reserve(std::size_t size) { low_.reserve(size); }
+  void clear() { resize(0); }
+  void push_back(const CellValues& values) { resize(size() + 1, values); }
+  void resize(std::size_t size, const CellValues& values = {}) {
+    const std::uint16_t kind = kind_of(values);
+    low_.resize(size, static_cast<std::uint8_t>(kind % 256));
+    if (is_wide_) high_.resize(size, static_cast<std::uint8_t>(kind / 256));
+  }
+  void set(std::size_t cell, const CellValues& values);
   std::size_t bytes() const;
 
  private:
   std::uint16_t kind_of(const CellValues& values);
 
-  std::vector<std::uint16_t> kind_;
+  std::vector<std::uint8_t> low_, high_;  // bytes of the number of each
+  bool is_wide_ = false;                  // whether there are high ones
   std::vector<CellValues> kinds_;
   std::uint16_t last_ = 0;  // mostly the next one too
 };
@@ -128,7 +138,11 @@ struct Hierarchy {
   /// Gives back what blades, and some backends, ask for alone: links, and incidences of all levels
   /// but the coarsest. The hierarchy cannot be updated then.
   void forget_neighbours();
-  /// Whether these are there, so that it can be updated.
+  /// Gives back what a backend without neighbours reads at a load alone: parents, and the slots of
+  /// all levels but the finest and the coarsest. The hierarchy cannot be loaded again then.
+  void forget_transfers();
+  bool has_transfers() const { return levels.size() < 2 || !levels[0].parent.empty(); }
+  /// Whether neighbours are there, so that it can be updated.
   bool has_neighbours() const { return !levels.empty() && !levels[0].link_begin.empty(); }
   std::size_t bytes() const;
 };

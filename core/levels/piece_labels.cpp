@@ -5,12 +5,14 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/error.hpp"
 #include "core/levels/union_find.hpp"
 
 namespace kerf {
 
 void PieceLabels::build(const Level& finest) {
-  piece_.reserve(with_room(finest.corner.size()));
+  cells_ = finest.corner.size();
+  piece_.reserve(with_room(cells_));
   piece_.assign(finest.corner.size(), -1);
   count_ = 0;
   std::vector<std::int32_t> next;
@@ -33,7 +35,9 @@ void PieceLabels::build(const Level& finest) {
 
 void PieceLabels::update(const LinkedOctree& body, const CutEvent& event, const Level& finest,
                          const LevelChange& change) {
+  ensures(piece_.size() == cells_, "labels that forgot how to change are asked to");
   for (const std::int32_t origin : change.origin) piece_.push_back(piece_[origin]);
+  cells_ = piece_.size();
   if (owner_.size() < piece_.size()) owner_.resize(piece_.capacity(), -1);
   std::vector<std::int32_t> ends;
   for (const LinkKey key : event.disconnected) add_ends(body, key, ends);
@@ -138,7 +142,14 @@ void PieceLabels::grow_until_known(const Level& finest) {
   }
 }
 
+void PieceLabels::forget_changes() {
+  if (count_ == 1) piece_ = {};
+  owner_ = {};
+  parts_ = {};
+}
+
 std::vector<std::int32_t> PieceLabels::by_first_cell() const {
+  if (piece_.empty()) return std::vector<std::int32_t>(cells_, 0);
   std::vector<std::int32_t> number(count_, -1), out;
   out.reserve(piece_.size());
   std::int32_t next = 0;

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/array.hpp"
 #include "core/body/cut.hpp"
 #include "core/levels/hierarchy.hpp"
 #include "core/levels/update.hpp"
@@ -26,7 +27,9 @@ class PieceLabels {
   std::size_t count() const { return count_; }
   /// Per cell of level 0, numbered from 0 by their first cell. Linear time.
   std::vector<std::int32_t> by_first_cell() const;
-  std::size_t bytes() const { return (piece_.size() + owner_.size()) * sizeof(std::int32_t); }
+  /// No blade is to come: gives back what only changes ask for.
+  void forget_changes();
+  std::size_t bytes() const { return bytes_of(piece_) + bytes_of(owner_); }
 
  private:
   /// A part of a piece, as far as it has grown.
@@ -45,7 +48,9 @@ class PieceLabels {
   void grow_until_known(const Level& finest);
   void give_number(const Part& part);
 
-  std::vector<std::int32_t> piece_;  // per cell; numbers are never used again
+  std::size_t cells_ = 0;
+  std::vector<std::int32_t> piece_;  // per cell, but empty where there is one piece for ever;
+                                     // numbers are never used again
   std::size_t count_ = 0;
   std::vector<std::int32_t> owner_;  // per cell: part, or -1; of the update under way
   std::vector<Part> parts_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/array.hpp"
 #include "core/base/error.hpp"
 #include "core/surface/surface_builder.hpp"
 
@@ -48,14 +49,23 @@ void Surface::update(const LinkedOctree& body, const CutEvent& event) {
   rebuild(body, std::move(points));
 }
 
+void Surface::forget_changes() {
+  builder_.reset();
+  store_.forget_changes();
+  points_.shrink_to_fit();
+  in_larger_ = {};
+}
+
 void Surface::rebuild(const LinkedOctree& body, std::vector<GridKey> points) {
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
+  ensures(builder_ != nullptr, "a surface that forgot how to change is asked to");
   builder_->rebuild(body, points, store_);
   store_.finish();
 }
 
 void Surface::bind(const LinkedOctree& body) {
+  ensures(builder_ != nullptr, "a surface that forgot how to change is asked to be bound");
   points_.resize(store_.vertex_slots());
   for (const std::int32_t v : store_.take_moved()) bind_vertex(body, v);
   for (; splits_seen_ < body.splits().size(); ++splits_seen_) {
@@ -72,7 +82,7 @@ void Surface::bind_vertex(const LinkedOctree& body, std::int32_t v) {
   const LinkedOctree::Node& node = body.nodes()[leaf];
   const double side = body.lattice().spacing * (1 << node.size_log2);
   const Vec3d& x = store_.reference[v];
-  points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner)), body.leaf_number(leaf)};
+  points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner())), body.leaf_number(leaf)};
   if (node.size_log2 > 0) in_larger_[points_[v].cell].push_back(v);
 }
 
@@ -82,7 +92,7 @@ SurfaceView Surface::view() const {
 }
 
 std::size_t Surface::bytes() const {
-  return store_.bytes() + builder_->bytes() + points_.capacity() * sizeof(BoundPoint);
+  return store_.bytes() + (builder_ ? builder_->bytes() : 0) + bytes_of(points_);
 }
 
 SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3d> normals,
@@ -96,8 +106,8 @@ SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3
   });
   for (const std::int32_t v : order) {
     number[v] = static_cast<std::int32_t>(out.reference.size());
-    out.reference.push_back(store_.reference[v]);
-    out.displacement.push_back(positions[v] - store_.reference[v]);
+    out.reference.push_back(points_[v].reference);
+    out.displacement.push_back(positions[v] - points_[v].reference);
     out.piece.push_back(piece[points_[v].cell]);
   }
 

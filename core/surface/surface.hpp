@@ -46,6 +46,10 @@ class Surface {
   /// split.
   void bind(const LinkedOctree& body);
 
+  /// No blade is to come: gives back what only changes ask for. `update` and `bind` cannot be
+  /// called any more.
+  void forget_changes();
+
   const TriangleStore& store() const { return store_; }
   SurfaceView view() const;
   std::size_t bytes() const;

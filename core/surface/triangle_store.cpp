@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/base/array.hpp"
 #include "core/base/error.hpp"
 
 namespace kerf {
@@ -163,12 +164,20 @@ void TriangleStore::finish() {
   changed_.clear();
 }
 
+void TriangleStore::forget_changes() {
+  const auto forget = [](auto&... arrays) { ((arrays = {}), ...); };
+  forget(reference, finest_cell, true_normal, first_normal_, next_normal_, changed_, moved_,
+         is_changed_, around_, parts_);
+  const auto fit = [](auto&... arrays) { (arrays.shrink_to_fit(), ...); };
+  fit(vertex_key, first_corner, used, triangles, group, order, next_corner, normal_of,
+      free_vertices_, free_triangles_, free_normals_);
+}
+
 std::size_t TriangleStore::bytes() const {
-  const auto of = [](const auto& array) { return array.capacity() * sizeof(array[0]); };
-  return of(reference) + of(finest_cell) + of(vertex_key) + of(first_corner) + of(triangles) +
-         of(group) + of(true_normal) + of(order) + of(next_corner) + of(normal_of) + of(used) +
-         of(first_normal_) + of(next_normal_) + of(free_vertices_) + of(free_triangles_) +
-         of(free_normals_) + of(changed_) + of(is_changed_);
+  const auto sum = [](const auto&... arrays) { return (bytes_of(arrays) + ...); };
+  return sum(reference, finest_cell, vertex_key, first_corner, triangles, group, true_normal, order,
+             next_corner, normal_of, used, first_normal_, next_normal_, free_vertices_,
+             free_triangles_, free_normals_, changed_, moved_, is_changed_, around_, parts_);
 }
 
 }  // namespace kerf

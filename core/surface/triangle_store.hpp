@@ -49,26 +49,29 @@ class TriangleStore {
 
   /// Hands out normals to the vertices whose triangles changed since the last call.
   void finish();
+  /// Gives back what only changes ask for; nothing may be changed any more.
+  void forget_changes();
   /// The vertices that were added, set or removed since the last call; some of them twice.
   std::vector<std::int32_t> take_moved() { return std::exchange(moved_, {}); }
 
-  std::size_t vertex_slots() const { return reference.size(); }
+  std::size_t vertex_slots() const { return vertex_key.size(); }
   std::size_t triangle_slots() const { return triangles.size(); }
   std::size_t normal_slots() const { return normals_; }
-  std::size_t vertices_used() const { return reference.size() - free_vertices_.size(); }
+  std::size_t vertices_used() const { return vertex_key.size() - free_vertices_.size(); }
   std::size_t triangles_used() const { return triangles.size() - free_triangles_.size(); }
   std::size_t bytes() const;
 
   // Per vertex.
-  std::vector<Vec3d> reference;  ///< m
-  std::vector<Vec3i> finest_cell;
+  std::vector<Vec3d> reference;    ///< m; empty once changes are forgotten
+  std::vector<Vec3i> finest_cell;  ///< the same
   std::vector<std::uint64_t> vertex_key;
   std::vector<std::int32_t> first_corner;
   std::vector<std::uint8_t> used;  ///< 0: the slot is free
   // Per triangle.
   std::vector<std::array<std::int32_t, 3>> triangles;
   std::vector<std::int32_t> group;
-  std::vector<Vec3f> true_normal;  ///< unit, outward, of the surface that the triangle stands for
+  std::vector<Vec3f> true_normal;  ///< unit, outward, of the surface that the triangle stands for;
+                                   ///< empty once changes are forgotten
   std::vector<std::uint64_t> order;
   // Per corner of a triangle.
   std::vector<std::int32_t> next_corner;

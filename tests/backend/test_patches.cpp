@@ -182,6 +182,8 @@ TEST(Patches, ForgetCornersOfRowsAlone) {
     }
     EXPECT_EQ(l.heads, whole.heads);
     EXPECT_EQ(l.row, whole.row);
+    EXPECT_EQ(l.tiles(), whole.tiles());
+    EXPECT_EQ(l.vertex.empty(), l.children.empty());  // on level 0
     EXPECT_EQ(l.corners.size(), 8 * kGroup * (others - before));
   }
   EXPECT_GT(in_rows, 50u);

@@ -126,7 +126,7 @@ void expect_bound_where_they_lie(const LinkedOctree& body, const Surface& surfac
     const double side = body.lattice().spacing * (1 << node.size_log2);
     const Vec3d& x = surface.store().reference[v];
     ASSERT_EQ(view.points[v].reference, x);
-    ASSERT_EQ(view.points[v].local, (1 / side) * (x - body.lattice().point(node.corner)));
+    ASSERT_EQ(view.points[v].local, (1 / side) * (x - body.lattice().point(node.corner())));
   }
 }
 

@@ -378,5 +378,55 @@ TEST(Levels, CoarseComponentIsHeldIffAllThatItMovesAreHeld) {
   }
 }
 
+TEST(CellValueList, HoldsAnyNumberOfKinds) {
+  const auto value = [](std::size_t kind) { return CellValues{1.0 + double(kind), 0.5, 3}; };
+  for (const std::size_t kinds : {1u, 255u, 256u, 257u, 1000u}) {
+    CellValueList list;
+    list.resize(300, value(0));
+    for (std::size_t i = 0; i < 300; ++i) list.set(i, value(7 * i % kinds));
+    for (std::size_t i = 300; i < 2000; ++i) list.push_back(value(7 * i % kinds));
+    list.resize(2100, value(kinds - 1));
+    ASSERT_EQ(list.size(), 2100u);
+    for (std::size_t i = 0; i < 2000; ++i) ASSERT_EQ(list[i], value(7 * i % kinds)) << i;
+    for (std::size_t i = 2000; i < 2100; ++i) ASSERT_EQ(list[i], value(kinds - 1)) << i;
+    list.clear();
+    for (const std::size_t kind : {kinds - 1, std::size_t{2000}, std::size_t{0}})
+      list.push_back(value(kind));
+    EXPECT_EQ(list[0], value(kinds - 1));
+    EXPECT_EQ(list[1], value(2000));
+    EXPECT_EQ(list[2], value(0));
+  }
+}
+
+TEST(LatticePoints, HoldTheWholeLattice) {
+  constexpr std::int32_t kLast = (1 << 21) - 1;
+  const std::vector<Vec3i> all{
+      {0, 0, 0}, {kLast, 0, 1}, {0, kLast, 2}, {3, 0, kLast}, {kLast, kLast, kLast}};
+  LatticePoints points;
+  for (const Vec3i& p : all) points.push_back(p);
+  EXPECT_TRUE(std::equal(all.begin(), all.end(), points.begin(), points.end()));
+  points.set(1, {4, 5, 6});
+  EXPECT_EQ(points[1], (Vec3i{4, 5, 6}));
+  EXPECT_EQ(points[2], all[2]);
+}
+
+TEST(LeafNodes, AreStoredOnceOneIsAnother) {
+  LeafNodes nodes;
+  for (std::int32_t n = 0; n < 9; ++n) nodes.push_back(n);
+  EXPECT_EQ(nodes.bytes(), 0u);
+  nodes.set(4, 4);
+  EXPECT_EQ(nodes.bytes(), 0u);
+  nodes.set(4, 20);
+  nodes.push_back(9);
+  EXPECT_GT(nodes.bytes(), 0u);
+  const std::vector<std::int32_t> expected{0, 1, 2, 3, 20, 5, 6, 7, 8, 9};
+  EXPECT_EQ(std::vector<std::int32_t>(nodes.begin(), nodes.end()), expected);
+
+  LeafNodes others;
+  for (const std::int32_t n : {3, 1}) others.push_back(n);
+  EXPECT_EQ(others[0], 3);
+  EXPECT_EQ(others[1], 1);
+}
+
 }  // namespace
 }  // namespace kerf

@@ -45,14 +45,17 @@ TEST(Memory, OfAUniformBodyInDoublePrecisionIsBounded) {
 
 TEST(Memory, WithoutBladesNoLinksAreKept) {
   SimulationSetup setup = cube(TimeMode::dynamic);
-  setup.body.resolution = 8;
+  setup.body.resolution = 24;
   Simulation uncut(setup, make_fast_backend({.threads = 1, .single_cycle = true}));
   EXPECT_TRUE(uncut.hierarchy().levels[0].linked.empty());
+  EXPECT_TRUE(uncut.hierarchy().levels[0].parent.empty());
+  EXPECT_THROW(make_fast_backend({.threads = 1})->load(uncut.hierarchy()), Error);
 
   setup.cuts.emplace_back().lines = {{{0.5, 2, -1}, {0.5, 2, 2}}, {{0.5, -1, -1}, {0.5, -1, 2}}};
   Simulation cut(setup, make_fast_backend({.threads = 1, .single_cycle = true}));
 
   EXPECT_FALSE(cut.hierarchy().levels[0].linked.empty());
+  EXPECT_FALSE(cut.hierarchy().levels[0].parent.empty());
   EXPECT_GT(cut.bytes(), uncut.bytes());
 }
 

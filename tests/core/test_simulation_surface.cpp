@@ -113,7 +113,7 @@ TEST(SimulationSurface, CountsItsBytes) {
 Vec3d field_of(const LinkedOctree& body, std::int32_t leaf, const Vec3d* corners, const Vec3d& x) {
   const auto& node = body.nodes()[static_cast<std::size_t>(leaf)];
   const double side = body.lattice().spacing * (1 << node.size_log2);
-  const Vec3d low = body.lattice().point(node.corner);
+  const Vec3d low = body.lattice().point(node.corner());
   Vec3d out;
   for (int i = 0; i < 8; ++i) {
     double weight = 1;
@@ -150,7 +150,7 @@ void expect_points_on_the_field(const Simulation& simulation) {
   const SurfaceMesh mesh = simulation.surface_mesh();
   const std::vector<Vec3d> corners = simulation.deformed_corners();
   const std::vector<std::int32_t> piece = label_pieces(simulation.body(), nullptr);
-  const std::vector<std::int32_t> leaves = simulation.body().leaves();
+  const LeafNodes leaves = simulation.body().leaves();
   std::map<std::int32_t, std::size_t> place_of;
   for (std::size_t i = 0; i < leaves.size(); ++i) place_of[leaves[i]] = i;
   ASSERT_FALSE(mesh.reference.empty());

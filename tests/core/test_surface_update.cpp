@@ -123,7 +123,7 @@ void expect_nearest_cells(const LinkedOctree& body, SurfaceMethod method, const 
 /// Cell numbers and local places say where the vertex is.
 void expect_bound_places(const LinkedOctree& body, const Surface& surface) {
   constexpr double kRounding = 1e-12;  // m, of a body of 1 m
-  const std::vector<std::int32_t> leaves = body.leaves();
+  const LeafNodes leaves = body.leaves();
   const SurfaceView view = surface.view();
   for (std::size_t v = 0; v < view.points.size(); ++v) {
     const BoundPoint& point = view.points[v];
@@ -133,7 +133,7 @@ void expect_bound_places(const LinkedOctree& body, const Surface& surface) {
     ASSERT_EQ(leaf, body.leaf_at(surface.store().finest_cell[v]));
     const auto& node = body.nodes()[static_cast<std::size_t>(leaf)];
     const double side = body.lattice().spacing * (1 << node.size_log2);
-    EXPECT_LT(norm(body.lattice().point(node.corner) + side * point.local - point.reference),
+    EXPECT_LT(norm(body.lattice().point(node.corner()) + side * point.local - point.reference),
               kRounding);
     EXPECT_EQ(point.reference, surface.store().reference[v]);
   }
@@ -351,6 +351,29 @@ TEST_P(SurfaceUpdates, FreedSlotsStayDrawableAndAreUsedAgain) {
   // Under splitting cubes a link adds two corners to a dual cell and takes two tips at most away,
   // so triangles only become more; their slots are freed and used again within an update.
   EXPECT_EQ(triangles_freed, GetParam() == SurfaceMethod::dual_contouring);
+}
+
+TEST_P(SurfaceUpdates, StayTheSameOnceTheyForgotHowToChange) {
+  const LinkedOctree body = test::scene("half_cut");
+  Surface surface(body, GetParam());
+  surface.bind(body);
+  const std::vector<Vec3d> at_rest = surface.store().reference;
+  const std::vector<Vec3d> normals(surface.view().normals, {1, 0, 0});
+  const SurfaceMesh before = test::mesh_at_rest(surface, body);
+  const std::size_t bytes = surface.bytes(), used = surface.store().vertices_used();
+
+  surface.forget_changes();
+
+  EXPECT_LT(surface.bytes(), bytes * 2 / 3);
+  EXPECT_EQ(surface.store().vertices_used(), used);
+  const SurfaceMesh after = surface.mesh(at_rest, normals, label_pieces(body, nullptr));
+  EXPECT_EQ(after.reference, before.reference);
+  EXPECT_EQ(after.triangles, before.triangles);
+  EXPECT_EQ(after.normal_of, before.normal_of);
+  EXPECT_EQ(after.cut_id, before.cut_id);
+  EXPECT_EQ(after.piece, before.piece);
+  EXPECT_THROW(surface.bind(body), Error);
+  EXPECT_THROW(surface.update(body, {}), Error);
 }
 
 TEST(Surfaces, NeedAMethod) {

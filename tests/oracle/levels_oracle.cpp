@@ -40,7 +40,8 @@ std::vector<Cell> leaf_cells(const LinkedOctree& body) {
   std::vector<Cell> cells;
   for (const std::int32_t leaf : body.leaves()) {
     const auto& node = body.nodes()[leaf];
-    cells.push_back({node.corner, 1 << node.size_log2, {static_cast<std::int32_t>(cells.size())}});
+    cells.push_back(
+        {node.corner(), 1 << node.size_log2, {static_cast<std::int32_t>(cells.size())}});
   }
   return cells;
 }
@@ -316,7 +317,8 @@ void renumber(Grid& grid, const Level& level, int number) {
     if (theirs[v] < 0) wrong("a vertex that no cell has", number, static_cast<int>(v));
     points[theirs[v]] = grid.point[v];
   }
-  if (points != level.point) wrong("place of a vertex", number, 0);
+  if (!std::equal(points.begin(), points.end(), level.point.begin(), level.point.end()))
+    wrong("place of a vertex", number, 0);
   grid.point = points;
   for (auto& corners : grid.corner)
     for (Weights& weights : corners) {
