@@ -35,12 +35,12 @@ double bytes_a_cell(const SimulationSetup& setup, bool single_cycle) {
 
 TEST(Memory, OfAUniformBodyInMixedPrecisionIsBounded) {
   // Statics keeps a pair of differences of each update: four of them here.
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::statics), true), 540);
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 520);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::statics), true), 480);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 440);
 }
 
 TEST(Memory, OfAUniformBodyInDoublePrecisionIsBounded) {
-  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), false), 980);
+  EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), false), 900);
 }
 
 TEST(Memory, WithoutBladesNoLinksAreKept) {
