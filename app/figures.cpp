@@ -101,7 +101,7 @@ LevelFigure level_figure(const LinkedOctree& body, const Hierarchy& hierarchy, s
 
 LinksFigure links_figure(const LinkedOctree& body) {
   LinksFigure out;
-  const LeafNodes& leaves = body.leaves();
+  const NodeList& leaves = body.leaves();
   const auto centre = [&](std::int32_t leaf) {
     const auto& node =
         body.nodes()[static_cast<std::size_t>(leaves[static_cast<std::size_t>(leaf)])];

@@ -55,7 +55,7 @@ void place_corners(const Lattice& lattice, const Level& level, std::int32_t cell
 }
 
 void add_boundary(const LinkedOctree& body, Snapshot& out) {
-  const LeafNodes& leaves = body.leaves();
+  const NodeList& leaves = body.leaves();
   for (std::size_t c = 0; c < leaves.size(); ++c) {
     const LinkedOctree::Node& leaf = body.nodes()[leaves[c]];
     if (leaf.size_log2 != 0) continue;  // larger leaves are linked on all sides

@@ -144,10 +144,10 @@ LinkedOctree::LinkedOctree(const Voxels& voxels, int refinement)
       for (r[1] = 0; r[1] < roots_[1]; ++r[1])
         for (r[0] = 0; r[0] < roots_[0]; ++r[0]) {
           const Vec3i corner{r[0] << refinement, r[1] << refinement, r[2] << refinement};
-          root_.push_back(-1);
-          if (!pyramid.inside(corner, refinement)) continue;
-          root_.back() = append_node(corner, refinement);
-          build(voxels, pyramid, root_.back());
+          const bool inside = pyramid.inside(corner, refinement);
+          const std::int32_t root = inside ? append_node(corner, refinement) : -1;
+          root_.push_back(root);
+          if (inside) build(voxels, pyramid, root);
         }
   }
   expects(leaf_count_ > 0, "no cell centre lies inside the body: raise the resolution");
@@ -387,9 +387,8 @@ std::size_t LinkedOctree::bytes() const {
   // A hash map spends a node with a next pointer on each record, and a pointer on each bucket.
   const std::size_t record = sizeof(std::pair<const LinkKey, LinkCut>) + sizeof(void*);
   // Room at the end of an array that was never written takes no memory.
-  return nodes_.size() * sizeof(Node) + leaves_.bytes() +
-         (root_.size() + splits_.size()) * sizeof(std::int32_t) + records_.size() * record +
-         records_.bucket_count() * sizeof(void*);
+  return nodes_.size() * sizeof(Node) + leaves_.bytes() + root_.bytes() + bytes_of(splits_) +
+         records_.size() * record + records_.bucket_count() * sizeof(void*);
 }
 
 void add_ends(const LinkedOctree& body, LinkKey link, std::vector<std::int32_t>& numbers) {

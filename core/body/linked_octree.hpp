@@ -25,7 +25,7 @@
 
 #include "core/body/lattice.hpp"
 #include "core/body/lattice_points.hpp"
-#include "core/body/leaf_nodes.hpp"
+#include "core/body/node_list.hpp"
 #include "core/body/voxelise.hpp"
 
 namespace kerf {
@@ -65,7 +65,7 @@ class LinkedOctree {
   /// The nodes that are present leaves. Ascending by (size, z, y, x) of their corner at first; a
   /// leaf that is split leaves its place to its first child, and the other seven are appended. So a
   /// place in this list, the number of the leaf, stays that of the cells at one corner for ever.
-  const LeafNodes& leaves() const { return leaves_; }
+  const NodeList& leaves() const { return leaves_; }
   std::size_t leaf_count() const { return leaf_count_; }
   /// The place in leaves() of a node that is a present leaf; -1 for others.
   std::int32_t leaf_number(std::int32_t node) const {
@@ -121,10 +121,10 @@ class LinkedOctree {
   Lattice lattice_;
   int refinement_ = 0;
   Vec3i roots_{};
-  std::vector<std::int32_t> root_;  // dense grid of root nodes, -1: none
+  NodeList root_;  // dense grid of root nodes, -1: none
   std::vector<Node> nodes_;
   std::unordered_map<LinkKey, LinkCut> records_;
-  LeafNodes leaves_;  // empty during construction
+  NodeList leaves_;  // empty during construction
   std::size_t leaf_count_ = 0;
   std::vector<std::int32_t> splits_;
 };

@@ -13,8 +13,7 @@ using Node = LinkedOctree::Node;
 /// Calls visit(a, b, axis) for each linked pair of leaves, given as nodes, a on the low side.
 /// The smaller leaf of a pair finds the larger; of two that are equal, the low one the high one.
 template <class Visit>
-void for_each_linked_pair(const LinkedOctree& body, const LeafNodes& leaves,
-                          const Visit& visit) {
+void for_each_linked_pair(const LinkedOctree& body, const NodeList& leaves, const Visit& visit) {
   const std::vector<Node>& nodes = body.nodes();
   for (const std::int32_t i : leaves) {
     const Node& leaf = nodes[static_cast<std::size_t>(i)];
@@ -44,7 +43,7 @@ std::int32_t find_root(std::vector<std::int32_t>& parent, std::int32_t i) {
 }  // namespace
 
 std::vector<LeafLink> leaf_links(const LinkedOctree& body) {
-  const LeafNodes& leaves = body.leaves();
+  const NodeList& leaves = body.leaves();
   std::vector<LeafLink> found;
   found.reserve(3 * leaves.size());
   std::vector<std::size_t> begin(leaves.size() + 1, 0);
@@ -66,7 +65,7 @@ std::vector<LeafLink> leaf_links(const LinkedOctree& body) {
 }
 
 std::vector<std::int32_t> label_pieces(const LinkedOctree& body, std::size_t* count) {
-  const LeafNodes& leaves = body.leaves();
+  const NodeList& leaves = body.leaves();
   std::vector<std::int32_t> parent(leaves.size());
   std::iota(parent.begin(), parent.end(), 0);
   for_each_linked_pair(body, leaves, [&](std::int32_t a, std::int32_t b, std::uint8_t) {

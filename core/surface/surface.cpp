@@ -100,10 +100,11 @@ SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3
   SurfaceMesh out;
   std::vector<std::int32_t> order, number(store_.vertex_slots(), -1);
   for (std::size_t v = 0; v < number.size(); ++v)
-    if (store_.used[v] != 0) order.push_back(static_cast<std::int32_t>(v));
-  std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-    return store_.vertex_key[a] < store_.vertex_key[b];
-  });
+    if (store_.used.empty() || store_.used[v] != 0) order.push_back(static_cast<std::int32_t>(v));
+  if (!store_.vertex_key.empty())
+    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+      return store_.vertex_key[a] < store_.vertex_key[b];
+    });
   for (const std::int32_t v : order) {
     number[v] = static_cast<std::int32_t>(out.reference.size());
     out.reference.push_back(points_[v].reference);
@@ -115,8 +116,9 @@ SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3
   for (std::size_t t = 0; t < store_.triangle_slots(); ++t)
     if (store_.triangles[t][0] != store_.triangles[t][1])
       order.push_back(static_cast<std::int32_t>(t));
-  std::sort(order.begin(), order.end(),
-            [&](std::int32_t a, std::int32_t b) { return store_.order[a] < store_.order[b]; });
+  if (!store_.order.empty())
+    std::sort(order.begin(), order.end(),
+              [&](std::int32_t a, std::int32_t b) { return store_.order[a] < store_.order[b]; });
   std::vector<std::int32_t> normal_number(store_.normal_slots(), -1);
   for (const std::int32_t t : order) {
     std::array<std::int32_t, 3> corners, normal;
@@ -131,7 +133,7 @@ SurfaceMesh Surface::mesh(std::span<const Vec3d> positions, std::span<const Vec3
     }
     out.triangles.push_back(corners);
     out.normal_of.push_back(normal);
-    out.cut_id.push_back(store_.group[t]);
+    out.cut_id.push_back(store_.group.empty() ? 0 : store_.group[t]);
   }
   return out;
 }

@@ -168,6 +168,11 @@ void TriangleStore::forget_changes() {
   const auto forget = [](auto&... arrays) { ((arrays = {}), ...); };
   forget(reference, finest_cell, true_normal, first_normal_, next_normal_, changed_, moved_,
          is_changed_, around_, parts_);
+  if (free_vertices_.empty() && free_triangles_.empty() &&
+      std::is_sorted(vertex_key.begin(), vertex_key.end()) &&
+      std::is_sorted(order.begin(), order.end()))
+    forget(vertex_key, order, used);
+  if (std::all_of(group.begin(), group.end(), [](std::int32_t g) { return g == 0; })) forget(group);
   const auto fit = [](auto&... arrays) { (arrays.shrink_to_fit(), ...); };
   fit(vertex_key, first_corner, used, triangles, group, order, next_corner, normal_of,
       free_vertices_, free_triangles_, free_normals_);

@@ -49,15 +49,16 @@ class TriangleStore {
 
   /// Hands out normals to the vertices whose triangles changed since the last call.
   void finish();
-  /// Gives back what only changes ask for; nothing may be changed any more.
+  /// Gives back what only changes ask for; nothing may be changed any more. Keys and orders go too
+  /// where they are those of the slots and no slot is free, and groups where all are 0.
   void forget_changes();
   /// The vertices that were added, set or removed since the last call; some of them twice.
   std::vector<std::int32_t> take_moved() { return std::exchange(moved_, {}); }
 
-  std::size_t vertex_slots() const { return vertex_key.size(); }
+  std::size_t vertex_slots() const { return first_corner.size(); }
   std::size_t triangle_slots() const { return triangles.size(); }
   std::size_t normal_slots() const { return normals_; }
-  std::size_t vertices_used() const { return vertex_key.size() - free_vertices_.size(); }
+  std::size_t vertices_used() const { return first_corner.size() - free_vertices_.size(); }
   std::size_t triangles_used() const { return triangles.size() - free_triangles_.size(); }
   std::size_t bytes() const;
 

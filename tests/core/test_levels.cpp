@@ -410,8 +410,8 @@ TEST(LatticePoints, HoldTheWholeLattice) {
   EXPECT_EQ(points[2], all[2]);
 }
 
-TEST(LeafNodes, AreStoredOnceOneIsAnother) {
-  LeafNodes nodes;
+TEST(NodeList, AreStoredOnceOneIsAnother) {
+  NodeList nodes;
   for (std::int32_t n = 0; n < 9; ++n) nodes.push_back(n);
   EXPECT_EQ(nodes.bytes(), 0u);
   nodes.set(4, 4);
@@ -422,7 +422,7 @@ TEST(LeafNodes, AreStoredOnceOneIsAnother) {
   const std::vector<std::int32_t> expected{0, 1, 2, 3, 20, 5, 6, 7, 8, 9};
   EXPECT_EQ(std::vector<std::int32_t>(nodes.begin(), nodes.end()), expected);
 
-  LeafNodes others;
+  NodeList others;
   for (const std::int32_t n : {3, 1}) others.push_back(n);
   EXPECT_EQ(others[0], 3);
   EXPECT_EQ(others[1], 1);

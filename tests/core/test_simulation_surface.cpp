@@ -150,7 +150,7 @@ void expect_points_on_the_field(const Simulation& simulation) {
   const SurfaceMesh mesh = simulation.surface_mesh();
   const std::vector<Vec3d> corners = simulation.deformed_corners();
   const std::vector<std::int32_t> piece = label_pieces(simulation.body(), nullptr);
-  const LeafNodes leaves = simulation.body().leaves();
+  const NodeList leaves = simulation.body().leaves();
   std::map<std::int32_t, std::size_t> place_of;
   for (std::size_t i = 0; i < leaves.size(); ++i) place_of[leaves[i]] = i;
   ASSERT_FALSE(mesh.reference.empty());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The node of each leaf, by its number. As long as that is the number itself, which it is in a
-// uniform body, nothing is stored.
+// Nodes of an octree by a number: of its leaves, or of its roots. As long as each is that number
+// itself, which it is in a uniform body and in a full lattice, nothing is stored.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace kerf {
 
-class LeafNodes {
+class NodeList {
  public:
   class Iterator {
    public:
@@ -25,14 +25,14 @@ class LeafNodes {
     using pointer = const std::int32_t*;
     using reference = std::int32_t;
 
-    Iterator(const LeafNodes* of, std::size_t at) : of_(of), at_(at) {}
+    Iterator(const NodeList* of, std::size_t at) : of_(of), at_(at) {}
     std::int32_t operator*() const { return (*of_)[at_]; }
     Iterator& operator++() { return ++at_, *this; }
     Iterator operator++(int) { return {of_, at_++}; }
     friend bool operator==(const Iterator&, const Iterator&) = default;
 
    private:
-    const LeafNodes* of_;
+    const NodeList* of_;
     std::size_t at_;
   };
 
