@@ -105,7 +105,7 @@ LinksFigure links_figure(const LinkedOctree& body) {
   const auto centre = [&](std::int32_t leaf) {
     const auto& node =
         body.nodes()[static_cast<std::size_t>(leaves[static_cast<std::size_t>(leaf)])];
-    const auto corners = rest_corners(body.lattice(), node.corner(), 1 << node.size_log2);
+    const auto corners = rest_corners(body.lattice(), node.corner, 1 << node.size_log2);
     return 0.5 * (corners[0] + corners[7]);
   };
   for (const LeafLink& link : leaf_links(body)) {

@@ -62,7 +62,7 @@ void add_boundary(const LinkedOctree& body, Snapshot& out) {
     for (int face = 0; face < 6; ++face) {
       if (!((leaf.cut_mask >> face) & 1)) continue;
       const int axis = face / 2, side = face % 2;
-      Vec3i lower = leaf.corner();
+      Vec3i lower = leaf.corner;
       lower[axis] -= 1 - side;
       const LinkCut* record = body.record(lower, axis);
       // This cell is the lower end of the link on its high side.

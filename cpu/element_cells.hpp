@@ -195,15 +195,15 @@ bool mean_rotation(const Cells& cells, const std::int32_t* children, double leas
   });
   mean = kernels::normalised(mean);
   const P square = P(static_cast<S>(least * least));
-  alignas(kPackBytes) S absent[P::kLanes];  // the rotation of such a lane is anyone's
-  for (int k = 0; k < P::kLanes; ++k) absent[k] = children[k] < 0 ? S(1) : S(0);
-  const auto is_absent = load_pack(absent) > P(S(0));
   auto near = P(S(0)) < P(S(1));
   kernels::unrolled<8>([&](auto octant) {
     const P cosine = dot(mean, of[octant]);
     near = near && !(cosine * cosine < square);
   });
-  return all(near || is_absent);
+  if (all(near)) return true;
+  P absent;  // the rotation of such a lane is anyone's
+  for (int k = 0; k < P::kLanes; ++k) absent.set(k, children[k] < 0 ? S(1) : S(0));
+  return all(near || absent > P(S(0)));
 }
 
 }  // namespace kerf::cpu

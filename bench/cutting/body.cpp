@@ -116,8 +116,8 @@ CutBody duplicated_body(const Shape& shape) {
     for (std::int32_t& x : p) x >>= kPartLevels;
     return p;
   };
-  for (LatticePoints* points : {&level.corner, &level.point})
-    for (std::size_t i = 0; i < points->size(); ++i) points->set(i, scaled((*points)[i]));
+  for (std::vector<LatticePoint>* points : {&level.corner, &level.point})
+    for (LatticePoint& p : *points) p = scaled(p);
   out.lattice.size = scaled(out.lattice.size);
   for (std::uint8_t& log2 : level.size_log2) {
     ensures(log2 == kPartLevels, "cells of one size alone are left");

@@ -270,13 +270,13 @@ class LinkSearch {
                Found& found) const {
     const std::int32_t leaf = body_.leaves()[static_cast<std::size_t>(number)];
     const LinkedOctree::Node& node = body_.nodes()[static_cast<std::size_t>(leaf)];
-    NearLeaf near{{&body_.lattice(), node.corner(), 1 << node.size_log2, corners}, {}, 0};
+    NearLeaf near{{&body_.lattice(), node.corner, 1 << node.size_log2, corners}, {}, 0};
     near.box = box_of(near.cell, {0, 0, 0}, near.cell.side);
     if (node.size_log2 == 0) near.mask = node.cut_mask;
     // Parts of links that were cut may reach beyond the cell.
     for (int face = 0; face < 6; ++face)
       if ((near.mask >> face & 1) != 0)
-        near.box.add(near.cell.position_at(far_end(body_, node.corner(), face)));
+        near.box.add(near.cell.position_at(far_end(body_, node.corner, face)));
     if (!near.box.overlaps(blade_box)) return;
     if (!are_few()) return found.near.push_back(near);
     LinkTests tests(body_, quantiser_, found.hits);

@@ -170,7 +170,7 @@ std::int32_t LinkedOctree::append_node(const Vec3i& corner, int size_log2) {
     throw Error(ErrorKind::unavailable,
                 "the octree has more than 2^31 cells: lower the resolution");
   Node node;
-  node.low = corner;
+  node.corner = corner;
   node.size_log2 = static_cast<std::uint8_t>(size_log2);
   node.present = 1;
   nodes_.push_back(node);
@@ -180,11 +180,11 @@ std::int32_t LinkedOctree::append_node(const Vec3i& corner, int size_log2) {
 /// Eight children of `node`, all present, with its material.
 std::int32_t LinkedOctree::append_children(std::int32_t node) {
   const Node parent = nodes_[static_cast<std::size_t>(node)];
-  const Vec3i low = parent.corner();
   const int k = parent.size_log2 - 1;
   const auto first = static_cast<std::int32_t>(nodes_.size());
   for (int i = 0; i < 8; ++i) {
-    append_node({low[0] + ((i & 1) << k), low[1] + ((i >> 1 & 1) << k), low[2] + ((i >> 2) << k)},
+    append_node({parent.corner[0] + ((i & 1) << k), parent.corner[1] + ((i >> 1 & 1) << k),
+                 parent.corner[2] + ((i >> 2) << k)},
                 k);
     nodes_.back().material = parent.material;
   }
@@ -193,7 +193,7 @@ std::int32_t LinkedOctree::append_children(std::int32_t node) {
 }
 
 void LinkedOctree::build(const Voxels& voxels, const Pyramid& pyramid, std::int32_t node) {
-  const Vec3i corner = nodes_[static_cast<std::size_t>(node)].corner();
+  const Vec3i corner = nodes_[static_cast<std::size_t>(node)].corner;
   const int k = nodes_[static_cast<std::size_t>(node)].size_log2;
   if (k == 0 || !pyramid.flagged(corner, k)) {
     // No flag: no cell inside has a neighbour outside or of another material, so all are alike.
@@ -204,7 +204,7 @@ void LinkedOctree::build(const Voxels& voxels, const Pyramid& pyramid, std::int3
   }
   const std::int32_t first = append_children(node);
   for (std::int32_t child = first; child < first + 8; ++child) {
-    if (pyramid.inside(nodes_[static_cast<std::size_t>(child)].corner(), k - 1))
+    if (pyramid.inside(nodes_[static_cast<std::size_t>(child)].corner, k - 1))
       build(voxels, pyramid, child);
     else
       nodes_[static_cast<std::size_t>(child)].present = 0;
@@ -226,9 +226,9 @@ void LinkedOctree::disconnect_surface(const Voxels& voxels) {
     if (node.size_log2 != 0 || node.present == 0) continue;
     for (int axis = 0; axis < 3; ++axis)
       for (int side = 0; side < 2; ++side) {
-        if (inside(shifted(node.corner(), axis, 2 * side - 1))) continue;
+        if (inside(shifted(node.corner, axis, 2 * side - 1))) continue;
         node.cut_mask = static_cast<std::uint8_t>(node.cut_mask | 1 << (2 * axis + side));
-        const Vec3i low = shifted(node.corner(), axis, side - 1);
+        const Vec3i low = shifted(node.corner, axis, side - 1);
         records_.try_emplace(lattice_.link_key(low, axis),
                              midpoint_cut(lattice_.spacing, axis, side == 1));
       }
@@ -243,7 +243,7 @@ void LinkedOctree::number_leaves() {
     if (node.present == 0 || !node.is_leaf()) continue;
     // The index of the corner grows with (z, y, x); lattices stay far below 2^58 cells.
     order.emplace_back(
-        static_cast<std::uint64_t>(node.size_log2) << 58 | lattice_.index(node.corner()),
+        static_cast<std::uint64_t>(node.size_log2) << 58 | lattice_.index(node.corner),
         static_cast<std::int32_t>(i));
   }
   if (!std::is_sorted(order.begin(), order.end())) std::sort(order.begin(), order.end());
@@ -275,8 +275,8 @@ void LinkedOctree::add_leaves_between(const Vec3i& low, const Vec3i& high,
           const Node& node = nodes_[static_cast<std::size_t>(i)];
           bool touches = node.present != 0;
           for (std::size_t d = 0; d < 3; ++d)
-            touches = touches && node.corner()[d] <= high[d] &&
-                      node.corner()[d] + (1 << node.size_log2) > low[d];
+            touches = touches && node.corner[d] <= high[d] &&
+                      node.corner[d] + (1 << node.size_log2) > low[d];
           if (!touches) continue;
           if (node.is_leaf()) numbers.push_back(leaf_number(i));
           for (int k = 7; !node.is_leaf() && k >= 0; --k) stack.push_back(node.first_child() + k);
@@ -332,11 +332,10 @@ void LinkedOctree::balance(std::vector<std::int32_t>& split_nodes) {
   while (!split_nodes.empty()) {
     const Node node = nodes_[static_cast<std::size_t>(split_nodes.back())];
     split_nodes.pop_back();
-    const Vec3i low = node.corner();
     const std::int32_t size = 1 << node.size_log2;
     for (int i = 0; i < 27; ++i) {
-      const Vec3i c{low[0] + (i % 3 - 1) * size, low[1] + (i / 3 % 3 - 1) * size,
-                    low[2] + (i / 9 - 1) * size};
+      const Vec3i c{node.corner[0] + (i % 3 - 1) * size, node.corner[1] + (i / 3 % 3 - 1) * size,
+                    node.corner[2] + (i / 9 - 1) * size};
       std::int32_t leaf = leaf_at(c);
       while (leaf >= 0 && nodes_[static_cast<std::size_t>(leaf)].size_log2 > node.size_log2) {
         split(leaf);

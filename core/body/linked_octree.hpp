@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "core/body/lattice.hpp"
-#include "core/body/lattice_points.hpp"
+#include "core/body/lattice_point.hpp"
 #include "core/body/node_list.hpp"
 #include "core/body/voxelise.hpp"
 
@@ -33,15 +33,14 @@ namespace kerf {
 class LinkedOctree {
  public:
   struct Node {
-    LatticePoint low{};
-    std::int32_t link = kNone;
+    LatticePoint corner{};       ///< low corner on the finest lattice
+    std::int32_t link = kNone;   ///< the first child, or from the leaf's number, or neither
     std::uint8_t size_log2 = 0;  ///< side in finest cells: 1 << size_log2
     std::uint8_t present = 0;    ///< 0: holds no material (deleted), never a leaf of the body
     std::uint8_t material = 0;   ///< index of the material, of a present leaf
     std::uint8_t cut_mask = 0;   ///< finest leaves: bit 2 a + s is set if the link along axis a
                                  ///< to side s (0 low, 1 high) is disconnected
 
-    Vec3i corner() const { return low; }  ///< low corner on the finest lattice
     bool is_leaf() const { return link < 0; }
     /// Eight consecutive nodes; -1 for a leaf.
     std::int32_t first_child() const { return std::max(link, -1); }

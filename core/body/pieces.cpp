@@ -20,7 +20,7 @@ void for_each_linked_pair(const LinkedOctree& body, const NodeList& leaves, cons
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (int side = 0; side < 2; ++side) {
         if ((leaf.cut_mask >> (2 * axis + static_cast<std::size_t>(side)) & 1) != 0) continue;
-        Vec3i c = leaf.corner();
+        Vec3i c = leaf.corner;
         c[axis] += side == 1 ? 1 << leaf.size_log2 : -1;
         const std::int32_t j = body.leaf_at(c);
         if (j < 0) continue;

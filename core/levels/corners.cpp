@@ -107,15 +107,14 @@ void FindNear::look_at_vertices(std::int32_t first, std::int32_t last, NearCells
   // In locals, because a byte that is written might be any of theirs.
   const Box3 box = reach_.box();
   const double h = spacing_;
-  const LatticePoints::Iterator point = level_.point.begin();
+  const LatticePoint* point = level_.point.data();
   const double* u = displacement_.data();
   std::uint8_t* beside = beside_.data();
   Box3 bounds;
   double sum = 0;  // finite as long as all are
   for (std::int32_t v = first; v < last; ++v) {
     const double* at = u + 3 * static_cast<std::size_t>(v);
-    const Vec3i x = point[v];
-    const Vec3d p{x[0] * h + at[0], x[1] * h + at[1], x[2] * h + at[2]};
+    const Vec3d p{point[v][0] * h + at[0], point[v][1] * h + at[1], point[v][2] * h + at[2]};
     const int bits = (p.x < box.lo.x ? 1 : 0) | (p.x > box.hi.x ? 2 : 0) |
                      (p.y < box.lo.y ? 4 : 0) | (p.y > box.hi.y ? 8 : 0) |
                      (p.z < box.lo.z ? 16 : 0) | (p.z > box.hi.z ? 32 : 0);

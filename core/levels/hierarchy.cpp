@@ -257,9 +257,9 @@ std::vector<CellLink> links_of(const Level& level) {
 }
 
 std::size_t Level::bytes() const {
-  return corner.bytes() + bytes_of(size_log2) + bytes_of(parent) + bytes_of(place) +
+  return bytes_of(corner) + bytes_of(size_log2) + bytes_of(parent) + bytes_of(place) +
          bytes_of(fold) + bytes_of(slots) + bytes_of(link_begin) + bytes_of(linked) +
-         bytes_of(child_begin) + bytes_of(children) + point.bytes() + bytes_of(fixed) +
+         bytes_of(child_begin) + bytes_of(children) + bytes_of(point) + bytes_of(fixed) +
          bytes_of(incidence_begin) + bytes_of(incidence) + bytes_of(link_rows.count) +
          bytes_of(child_rows.count) + bytes_of(incidence_rows.count);
 }
@@ -271,8 +271,7 @@ std::uint16_t CellValueList::kind_of(const CellValues& values) {
   if (found != kinds_.end()) return last_;
   expects(kinds_.size() < 65535, "the body has more than 65535 kinds of cells");
   kinds_.push_back(values);
-  if (kinds_.size() == 257) {
-    is_wide_ = true;
+  if (is_wide() && last_ == 256) {
     high_.reserve(low_.capacity());
     high_.assign(low_.size(), 0);
   }
@@ -282,7 +281,7 @@ std::uint16_t CellValueList::kind_of(const CellValues& values) {
 void CellValueList::set(std::size_t cell, const CellValues& values) {
   const std::uint16_t kind = kind_of(values);
   low_[cell] = static_cast<std::uint8_t>(kind % 256);
-  if (is_wide_) high_[cell] = static_cast<std::uint8_t>(kind / 256);
+  if (is_wide()) high_[cell] = static_cast<std::uint8_t>(kind / 256);
 }
 
 std::size_t CellValueList::bytes() const {
@@ -303,7 +302,7 @@ void add_links_of_leaf(const LinkedOctree& body, std::int32_t number,
   for (int face = 0; face < 6; ++face) {
     if ((leaf.cut_mask >> face & 1) != 0) continue;
     const auto axis = static_cast<std::size_t>(face / 2);
-    Vec3i c = leaf.corner();
+    Vec3i c = leaf.corner;
     c[axis] += face % 2 == 1 ? size : -1;
     const std::int32_t other = body.leaf_at(c);
     if (other >= 0 && nodes[other].size_log2 >= leaf.size_log2) {
@@ -332,7 +331,7 @@ Level finest_level(const LinkedOctree& body) {
   std::vector<std::int32_t> row;
   for (std::int32_t number = 0; number < static_cast<std::int32_t>(cells); ++number) {
     const LinkedOctree::Node& cell = body.nodes()[body.leaves()[number]];
-    level.corner.push_back(cell.corner());
+    level.corner.push_back(cell.corner);
     level.size_log2.push_back(cell.size_log2);
     add_links_of_leaf(body, number, row);
     append_links(row, level);

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "core/body/lattice.hpp"
-#include "core/body/lattice_points.hpp"
+#include "core/body/lattice_point.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/levels/rows.hpp"
 
@@ -33,7 +33,7 @@ struct Level {
   static constexpr std::uint8_t kPassed = 8;
 
   // Cells; built in the order of body.leaves() on level 0, ascending by (size, z, y, x) above.
-  LatticePoints corner;                 ///< low corner, finest lattice
+  std::vector<LatticePoint> corner;     ///< low corner, finest lattice
   std::vector<std::uint8_t> size_log2;  ///< side, in finest cells: 1 << size_log2
   std::vector<std::int32_t> parent;  ///< cell of the next level; empty on the coarsest, and after
                                      ///< Hierarchy::forget_transfers
@@ -44,7 +44,7 @@ struct Level {
   std::vector<std::array<std::int32_t, 8>> slots;
 
   // Vertices; built ascending by (z, y, x) of their grid point, then by their first cell.
-  LatticePoints point;              ///< finest lattice
+  std::vector<LatticePoint> point;  ///< finest lattice
   std::vector<std::uint8_t> fixed;  ///< bit c: component c is held
 
   // Lists, to be read by the functions below: these arrays lie packed only after a build and
@@ -97,7 +97,7 @@ struct CellValues {
 class CellValueList {
  public:
   const CellValues& operator[](std::size_t cell) const {
-    return kinds_[low_[cell] + (is_wide_ ? 256U * high_[cell] : 0U)];
+    return kinds_[low_[cell] + (is_wide() ? 256U * high_[cell] : 0U)];
   }
   std::size_t size() const { return low_.size(); }
   void reserve(std::size_t size) { low_.reserve(size); }
@@ -106,16 +106,16 @@ class CellValueList {
   void resize(std::size_t size, const CellValues& values = {}) {
     const std::uint16_t kind = kind_of(values);
     low_.resize(size, static_cast<std::uint8_t>(kind % 256));
-    if (is_wide_) high_.resize(size, static_cast<std::uint8_t>(kind / 256));
+    if (is_wide()) high_.resize(size, static_cast<std::uint8_t>(kind / 256));
   }
   void set(std::size_t cell, const CellValues& values);
   std::size_t bytes() const;
 
  private:
   std::uint16_t kind_of(const CellValues& values);
+  bool is_wide() const { return kinds_.size() > 256; }
 
-  std::vector<std::uint8_t> low_, high_;  // bytes of the number of each
-  bool is_wide_ = false;                  // whether there are high ones
+  std::vector<std::uint8_t> low_, high_;  // bytes of the number of each; no high ones if not wide
   std::vector<CellValues> kinds_;
   std::uint16_t last_ = 0;  // mostly the next one too
 };

@@ -41,7 +41,7 @@ Cells split_cells(const LinkedOctree& body, const CutEvent& event, Level& level,
     touched.whole.push_back(cell);
   for (const std::int32_t cell : touched.whole) {
     const LinkedOctree::Node& node = body.nodes()[body.leaves()[cell]];
-    level.corner.set(static_cast<std::size_t>(cell), node.corner());
+    level.corner[cell] = node.corner;
     level.size_log2[cell] = node.size_log2;
   }
   relink.insert(relink.end(), touched.whole.begin(), touched.whole.end());
@@ -152,7 +152,7 @@ class Regroup {
     const bool same_children = std::equal(old.begin(), old.end(), part_.begin(), part_.end());
     if (corner != coarse_.corner[cell] || size_log2 != coarse_.size_log2[cell] || !same_children)
       log_.touch(cell);
-    coarse_.corner.set(static_cast<std::size_t>(cell), corner);
+    coarse_.corner[cell] = corner;
     coarse_.size_log2[cell] = size_log2;
     if (!same_children) children_.set(cell, part_);
     set_parent(cell);

@@ -137,7 +137,7 @@ std::vector<Component> number_vertices(Level& level, const Places& places, Union
   level.point.resize(entries.size());
   for (std::size_t v = 0; v < entries.size(); ++v) {
     const std::int32_t place = entries[v].second;
-    level.point.set(v, corner_point(level, place / 8, place % 8));
+    level.point[v] = corner_point(level, place / 8, place % 8);
     component[place].vertex = static_cast<std::int32_t>(v);
   }
   return component;

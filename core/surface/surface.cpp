@@ -82,7 +82,7 @@ void Surface::bind_vertex(const LinkedOctree& body, std::int32_t v) {
   const LinkedOctree::Node& node = body.nodes()[leaf];
   const double side = body.lattice().spacing * (1 << node.size_log2);
   const Vec3d& x = store_.reference[v];
-  points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner())), body.leaf_number(leaf)};
+  points_[v] = {x, (1 / side) * (x - body.lattice().point(node.corner)), body.leaf_number(leaf)};
   if (node.size_log2 > 0) in_larger_[points_[v].cell].push_back(v);
 }
 

@@ -35,7 +35,7 @@ std::vector<Vec3d> moved_corners(const LinkedOctree& body, const Vec3d& shift) {
   for (const std::int32_t i : body.leaves()) {
     const auto& leaf = body.nodes()[static_cast<std::size_t>(i)];
     for (int k = 0; k < 8; ++k) {
-      Vec3i p = leaf.corner();
+      Vec3i p = leaf.corner;
       for (std::size_t d = 0; d < 3; ++d) p[d] += (k >> d & 1) << leaf.size_log2;
       out.push_back(body.lattice().point(p) + shift);
     }

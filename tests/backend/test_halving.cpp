@@ -20,7 +20,7 @@ Level box_level(int nx, int ny, int nz) {
   Level level;
   for (int z = 0; z < nz; ++z)
     for (int y = 0; y < ny; ++y)
-      for (int x = 0; x < nx; ++x) level.corner.push_back({x, y, z});
+      for (int x = 0; x < nx; ++x) level.corner.push_back(Vec3i{x, y, z});
   return level;
 }
 

@@ -75,7 +75,7 @@ std::vector<double> random_displacement(const LinkedOctree& body, const Level& l
   const double bend = dice.between(-0.5, 0.5) / lattice.spacing / 14;
   const double shake = dice.roll(3) == 0 ? 0.4 * lattice.spacing : 0;
   std::vector<double> out;
-  for (const Vec3i& p : level.point) {
+  for (const Vec3i p : level.point) {
     const Vec3d r = lattice.point(p) - lattice.origin;
     const Vec3d u = Vec3d{0.3 * r.z, bend * r.x * r.x, 0} + shake * dice.direction();
     out.insert(out.end(), {u.x, u.y, u.z});
@@ -126,7 +126,7 @@ void expect_bound_where_they_lie(const LinkedOctree& body, const Surface& surfac
     const double side = body.lattice().spacing * (1 << node.size_log2);
     const Vec3d& x = surface.store().reference[v];
     ASSERT_EQ(view.points[v].reference, x);
-    ASSERT_EQ(view.points[v].local, (1 / side) * (x - body.lattice().point(node.corner())));
+    ASSERT_EQ(view.points[v].local, (1 / side) * (x - body.lattice().point(node.corner)));
   }
 }
 

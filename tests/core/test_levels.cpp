@@ -398,16 +398,17 @@ TEST(CellValueList, HoldsAnyNumberOfKinds) {
   }
 }
 
-TEST(LatticePoints, HoldTheWholeLattice) {
+TEST(LatticePoint, HoldsTheWholeLattice) {
   constexpr std::int32_t kLast = (1 << 21) - 1;
   const std::vector<Vec3i> all{
       {0, 0, 0}, {kLast, 0, 1}, {0, kLast, 2}, {3, 0, kLast}, {kLast, kLast, kLast}};
-  LatticePoints points;
-  for (const Vec3i& p : all) points.push_back(p);
-  EXPECT_TRUE(std::equal(all.begin(), all.end(), points.begin(), points.end()));
-  points.set(1, {4, 5, 6});
-  EXPECT_EQ(points[1], (Vec3i{4, 5, 6}));
-  EXPECT_EQ(points[2], all[2]);
+  const std::vector<LatticePoint> points(all.begin(), all.end());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(Vec3i(points[i]), all[i]);
+    for (std::size_t axis = 0; axis < 3; ++axis) EXPECT_EQ(points[i][axis], all[i][axis]);
+    EXPECT_TRUE(points[i] == all[i]);
+    EXPECT_FALSE(points[i] == all[(i + 1) % all.size()]);
+  }
 }
 
 TEST(NodeList, AreStoredOnceOneIsAnother) {

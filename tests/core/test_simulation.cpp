@@ -129,7 +129,7 @@ TEST(Transfer, KeepsTheFieldOverACut) {
   updater.update_coarse(levels, {});
   const Level& after = levels.levels[0];
   std::vector<std::int32_t> origin;
-  for (const Vec3i& corner : after.corner) origin.push_back(old_cell.at(corner));
+  for (const Vec3i corner : after.corner) origin.push_back(old_cell.at(corner));
   const NewVertices fresh = new_vertices(after, updater.change().levels[0]);
   std::vector<double> carried = values, sources;
   for (const std::int32_t v : fresh.source)

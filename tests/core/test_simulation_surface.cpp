@@ -113,7 +113,7 @@ TEST(SimulationSurface, CountsItsBytes) {
 Vec3d field_of(const LinkedOctree& body, std::int32_t leaf, const Vec3d* corners, const Vec3d& x) {
   const auto& node = body.nodes()[static_cast<std::size_t>(leaf)];
   const double side = body.lattice().spacing * (1 << node.size_log2);
-  const Vec3d low = body.lattice().point(node.corner());
+  const Vec3d low = body.lattice().point(node.corner);
   Vec3d out;
   for (int i = 0; i < 8; ++i) {
     double weight = 1;

@@ -133,7 +133,7 @@ void expect_bound_places(const LinkedOctree& body, const Surface& surface) {
     ASSERT_EQ(leaf, body.leaf_at(surface.store().finest_cell[v]));
     const auto& node = body.nodes()[static_cast<std::size_t>(leaf)];
     const double side = body.lattice().spacing * (1 << node.size_log2);
-    EXPECT_LT(norm(body.lattice().point(node.corner()) + side * point.local - point.reference),
+    EXPECT_LT(norm(body.lattice().point(node.corner) + side * point.local - point.reference),
               kRounding);
     EXPECT_EQ(point.reference, surface.store().reference[v]);
   }

@@ -40,8 +40,7 @@ std::vector<Cell> leaf_cells(const LinkedOctree& body) {
   std::vector<Cell> cells;
   for (const std::int32_t leaf : body.leaves()) {
     const auto& node = body.nodes()[leaf];
-    cells.push_back(
-        {node.corner(), 1 << node.size_log2, {static_cast<std::int32_t>(cells.size())}});
+    cells.push_back({node.corner, 1 << node.size_log2, {static_cast<std::int32_t>(cells.size())}});
   }
   return cells;
 }

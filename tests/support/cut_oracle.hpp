@@ -24,9 +24,9 @@ std::vector<Vec3d> corners_of(const LinkedOctree& body, const Map& map) {
     const auto& n = body.nodes()[static_cast<std::size_t>(leaf)];
     const int size = 1 << n.size_log2;
     for (int i = 0; i < 8; ++i)
-      corners.push_back(map(
-          body.lattice().point({n.corner()[0] + (i & 1) * size, n.corner()[1] + (i >> 1 & 1) * size,
-                                n.corner()[2] + (i >> 2) * size})));
+      corners.push_back(
+          map(body.lattice().point({n.corner[0] + (i & 1) * size, n.corner[1] + (i >> 1 & 1) * size,
+                                    n.corner[2] + (i >> 2) * size})));
   }
   return corners;
 }
@@ -56,7 +56,7 @@ inline std::map<LinkKey, std::array<double, 2>> crossed_links(const LinkedOctree
     const auto& n = p.node(leaf);
     double s[3];
     for (std::size_t d = 0; d < 3; ++d)
-      s[d] = (cell[d] - n.corner()[d] + 0.5 + 0.5 * q[d]) / (1 << n.size_log2);
+      s[d] = (cell[d] - n.corner[d] + 0.5 + 0.5 * q[d]) / (1 << n.size_log2);
     Vec3d x;
     for (int i = 0; i < 8; ++i)
       x += (((i & 1) != 0 ? s[0] : 1 - s[0]) * ((i & 2) != 0 ? s[1] : 1 - s[1]) *

@@ -53,7 +53,7 @@ struct PaintedLeaves {
     for (int z = 0; z < size; ++z)
       for (int y = 0; y < size; ++y)
         for (int x = 0; x < size; ++x)
-          f(Vec3i{n.corner()[0] + x - rim, n.corner()[1] + y - rim, n.corner()[2] + z - rim});
+          f(Vec3i{n.corner[0] + x - rim, n.corner[1] + y - rim, n.corner[2] + z - rim});
   }
   /// Calls f(lower, axis) for each link with an end inside.
   template <class F>
@@ -83,16 +83,16 @@ inline ::testing::AssertionResult tree_holds(const PaintedLeaves& p,
   const auto& nodes = p.octree.nodes();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const auto& n = nodes[i];
-    if (n.size_log2 > p.octree.refinement()) return broken("size", n.corner());
+    if (n.size_log2 > p.octree.refinement()) return broken("size", n.corner);
     if (n.is_leaf()) continue;
-    if (n.present == 0) return broken("deleted node with children", n.corner());
+    if (n.present == 0) return broken("deleted node with children", n.corner);
     for (int k = 0; k < 8; ++k) {
       const auto& child = nodes[static_cast<std::size_t>(n.first_child() + k)];
       const int half = 1 << child.size_log2;
-      const Vec3i corner{n.corner()[0] + (k & 1) * half, n.corner()[1] + (k >> 1 & 1) * half,
-                         n.corner()[2] + (k >> 2) * half};
-      if (child.size_log2 + 1 != n.size_log2 || child.corner() != corner)
-        return broken("child and parent disagree", n.corner());
+      const Vec3i corner{n.corner[0] + (k & 1) * half, n.corner[1] + (k >> 1 & 1) * half,
+                         n.corner[2] + (k >> 2) * half};
+      if (child.size_log2 + 1 != n.size_log2 || child.corner != corner)
+        return broken("child and parent disagree", n.corner);
     }
   }
   if (p.overlapping) return broken("leaves overlap or leave the lattice", {});
@@ -102,13 +102,13 @@ inline ::testing::AssertionResult tree_holds(const PaintedLeaves& p,
     const auto& n = p.node(static_cast<std::int32_t>(i));
     volume += std::size_t{1} << (3 * n.size_log2);
     if (p.octree.leaf_number(p.leaves[i]) != static_cast<std::int32_t>(i))
-      return broken("leaf_number()", n.corner());
+      return broken("leaf_number()", n.corner);
     if (i == 0 || !p.octree.splits().empty()) continue;
     const auto& m = p.node(static_cast<std::int32_t>(i) - 1);
     const auto key = [](const LinkedOctree::Node& a) {
-      return std::array{static_cast<int>(a.size_log2), a.corner()[2], a.corner()[1], a.corner()[0]};
+      return std::array{static_cast<int>(a.size_log2), a.corner[2], a.corner[1], a.corner[0]};
     };
-    if (!(key(m) < key(n))) return broken("leaves() is not sorted", n.corner());
+    if (!(key(m) < key(n))) return broken("leaves() is not sorted", n.corner);
   }
   for (std::size_t i = 0; i < label.size(); ++i) {
     const Vec3i c = p.octree.lattice().cell(i);
@@ -128,13 +128,13 @@ inline ::testing::AssertionResult rules_hold(const PaintedLeaves& p) {
   for (std::size_t i = 0; i < p.leaves.size(); ++i) {
     const auto& n = p.node(static_cast<std::int32_t>(i));
     if (n.size_log2 == 0) continue;
-    if (n.cut_mask != 0) return broken("rule 1, mask", n.corner());
+    if (n.cut_mask != 0) return broken("rule 1, mask", n.corner);
     bool open = false;
     PaintedLeaves::for_each_cell(n, 0, [&](const Vec3i& c) {
       for (int axis = 0; axis < 3; ++axis)
         open = open || p.at(plus(c, axis, -1)) < 0 || p.at(plus(c, axis, 1)) < 0;
     });
-    if (open) return broken("rule 1, a large leaf at the surface", n.corner());
+    if (open) return broken("rule 1, a large leaf at the surface", n.corner);
   }
   for (const auto& n : p.octree.nodes()) {
     if (n.is_leaf()) continue;
@@ -142,7 +142,7 @@ inline ::testing::AssertionResult rules_hold(const PaintedLeaves& p) {
     PaintedLeaves::for_each_cell(n, 1, [&](const Vec3i& c) {
       balanced = balanced && (p.at(c) < 0 || p.node(p.at(c)).size_log2 <= n.size_log2);
     });
-    if (!balanced) return broken("rule 2", n.corner());
+    if (!balanced) return broken("rule 2", n.corner);
   }
   for (const auto& entry : p.octree.records()) {
     const Vec3i low = p.octree.lattice().link_lower(entry.first);

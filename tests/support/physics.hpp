@@ -48,7 +48,7 @@ inline Hierarchy one_material(const LinkedOctree& body, const Material& material
 template <class Field>
 std::vector<double> at_vertices(const LinkedOctree& body, const Level& level, const Field& field) {
   std::vector<double> out;
-  for (const Vec3i& p : level.point) {
+  for (const Vec3i p : level.point) {
     const Vec3d value = field(body.lattice().point(p));
     out.insert(out.end(), {value.x, value.y, value.z});
   }

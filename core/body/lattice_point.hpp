@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+//
+// A point of the finest lattice in eight bytes: every cell and every vertex has one.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/geometry/vec.hpp"
+
+namespace kerf {
+
+/// Coordinates are from 0 on, and below 2^21: lattices have less than 2^20 cells along an axis.
+class LatticePoint {
+ public:
+  LatticePoint() = default;
+  LatticePoint(const Vec3i& p)  // NOLINT: they are one thing
+      : key_(static_cast<std::uint64_t>(p[0]) | static_cast<std::uint64_t>(p[1]) << kBits |
+             static_cast<std::uint64_t>(p[2]) << (2 * kBits)) {}
+  operator Vec3i() const { return {(*this)[0], (*this)[1], (*this)[2]}; }  // NOLINT
+  std::int32_t operator[](std::size_t axis) const {
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
+    return static_cast<std::int32_t>(key_ >> (kBits * axis) & kMask);
+  }
+  friend bool operator==(const LatticePoint&, const LatticePoint&) = default;
+
+ private:
+  static constexpr int kBits = 21;
+  std::uint64_t key_ = 0;
+};
+
+}  // namespace kerf
