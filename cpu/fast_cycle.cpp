@@ -202,8 +202,7 @@ void FastBackend<S>::sum_given(int fine, const S* given) {
   const Transfer& transfer = levels_[fine].patched.transfer;
   S* f = to.at(kRight);
   const bool is_worth = levels_[fine].patched.cell.size() >= kWorthCells;
-#pragma omp parallel for num_threads(threads_) schedule(static) if (is_worth)
-  for (std::int32_t t = 0; t < to.tiles(); ++t) {
+  parallel(to.tiles(), is_worth ? 0 : to.tiles() + 1, [&](std::int32_t t) {
     const auto tile = static_cast<std::size_t>(t);
     for_packs<S>([&](int first) {
       alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};
@@ -214,7 +213,7 @@ void FastBackend<S>::sum_given(int fine, const S* given) {
       store_tile(f, tile, first,
                  masked(gathered(static_cast<const S*>(sums)), to.fixed(tile, first)));
     });
-  }
+  });
   zero(fine + 1, kSolution);
 }
 

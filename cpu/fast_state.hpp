@@ -19,6 +19,7 @@
 #include "cpu/fast_diagonals.hpp"
 #include "cpu/fast_kernels.hpp"
 #include "cpu/finest_values.hpp"
+#include "cpu/flush.hpp"
 #include "cpu/front_factor.hpp"
 #include "cpu/instruction_set.hpp"
 #include "cpu/inverse_diagonals.hpp"
@@ -214,14 +215,22 @@ class FastBackend final : public Backend {
  private:
   template <class Body>
   void parallel(std::int32_t count, std::int32_t worth, const Body& body) const {
-#pragma omp parallel for num_threads(threads_) schedule(static) if (count >= worth)
-    for (std::int32_t i = 0; i < count; ++i) body(i);
+#pragma omp parallel num_threads(threads_) if (count >= worth)
+    {
+      const FlushToZero flush;
+#pragma omp for schedule(static)
+      for (std::int32_t i = 0; i < count; ++i) body(i);
+    }
   }
   /// body(tile), for tiles of vertices.
   template <class Body>
   void for_tiles(std::int32_t begin, std::int32_t end, const Body& body) const {
-#pragma omp parallel for num_threads(threads_) schedule(static) if (end - begin >= kWorthTiles)
-    for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
+#pragma omp parallel num_threads(threads_) if (end - begin >= kWorthTiles)
+    {
+      const FlushToZero flush;
+#pragma omp for schedule(static)
+      for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
+    }
   }
   /// body(patch), for the patches of a level.
   template <class Body>
@@ -370,6 +379,7 @@ Sums FastBackend<S>::sweep(int level, const Before& before, const Start& start, 
   std::vector<Sums> sums(l.patches.size() + l.shared_tiles.size());
 #pragma omp parallel num_threads(threads_) if (l.cell.size() >= kWorthCells)
   {
+    const FlushToZero flush;
 #pragma omp for schedule(static)
     for (std::int32_t n = 0; n < shared; ++n) before(static_cast<std::size_t>(l.shared_tiles[n]));
 #pragma omp for schedule(dynamic, 1)

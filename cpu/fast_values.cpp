@@ -133,10 +133,9 @@ void FastBackend<S>::turn(int level, const Cells& cells) {
   const bool may_be_one = !kIsDouble && level + 1 < static_cast<int>(levels_.size()) &&
                           (scale_.mass == 0 || !hierarchy_->lumped_mass);
   const auto groups = static_cast<std::int32_t>(packed.groups());
-#pragma omp parallel for num_threads(threads_) schedule(static) if (groups >= kWorthGroups)
-  for (std::int32_t g = 0; g < groups; ++g) {
+  parallel(groups, kWorthGroups, [&](std::int32_t g) {
     const auto group = static_cast<std::size_t>(g);
-    if (!is_of_finest(packed.kind[group])) continue;
+    if (!is_of_finest(packed.kind[group])) return;
     const bool eight = is_of_eight(packed.kind[group]);
     const std::int32_t* const all = packed.children.data() + 8 * kGroup * group;
     bool is_one = !eight || (may_be_one && cells.are_all(all));
@@ -151,7 +150,7 @@ void FastBackend<S>::turn(int level, const Cells& cells) {
         to.matrices.store(group, first, rotation);
       });
     if (!is_one) to.matrices.do_not_turn(group);
-  }
+  });
 }
 
 template <class S>
@@ -172,6 +171,7 @@ void FastBackend<S>::coarsen(int fine) {
   // General cells cost many times as much as others, and lie together.
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
+    const FlushToZero flush;
     const auto group = static_cast<std::size_t>(g);
     const std::uint16_t kind = packed.kind[group];
     if (kind == kNoCells || kind == kIdle || to.matrices.is_turned(group)) continue;

@@ -8,6 +8,7 @@
 #include <exception>
 
 #include "core/base/workers.hpp"
+#include "cpu/flush.hpp"
 
 namespace kerf::cpu {
 
@@ -37,18 +38,27 @@ class ParallelErrors {
 /// Runs body(i) for i from begin to end on some threads. What they throw, one of them at least, is
 /// thrown here.
 template <class Body>
-void for_patches(std::int32_t begin, std::int32_t end, int threads, const Body& body) {
+void for_parts(std::int32_t begin, std::int32_t end, int threads, const Body& body) {
   ParallelErrors errors;
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 1) if (end - begin > 1)
   for (std::int32_t i = begin; i < end; ++i) errors.run([&] { body(i); });
   errors.rethrow();
 }
 
+/// The same for the arithmetic of elements.
+template <class Body>
+void for_patches(std::int32_t begin, std::int32_t end, int threads, const Body& body) {
+  for_parts(begin, end, threads, [&](std::int32_t i) {
+    const FlushToZero flush;
+    body(i);
+  });
+}
+
 /// Those of OpenMP for work of the host. Threads of its own would share processors with these,
 /// which look for more work for some milliseconds before they sleep.
 inline Workers workers_of(int threads) {
   return {threads, [threads](int count, const Workers::Piece& piece) {
-            for_patches(0, count, threads, piece);
+            for_parts(0, count, threads, piece);
           }};
 }
 
