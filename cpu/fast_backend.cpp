@@ -183,10 +183,9 @@ void FastBackend<S>::rotate_cells(int displacement) {
     const Patch& patch = l.patches[p];
     PatchPoints<double> points(l, patch);
     points.load([&](std::size_t tile, int first) { return load_tile(u, tile, first); }, u);
-    constexpr int kMost = RotationBatch::kGroups;
-    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); g += kMost)
+    for (std::int32_t g = patch.groups.first; g < patch.groups.end(); g += kRotatedGroups)
       rotate_groups(l, rotations_, static_cast<std::size_t>(g),
-                    std::min(kMost, patch.groups.end() - g), points.x());
+                    std::min(kRotatedGroups, patch.groups.end() - g), points.x());
   });
 }
 

@@ -2,8 +2,9 @@
 //
 // Rotations of groups of cells from their displacements, warm-started: no threads.
 //
-// Each operation of a Newton step waits for the one before, so several groups take theirs in turn.
-// All but the last step is in single precision.
+// Each operation of a Newton step waits for the one before, so two packs of groups take theirs in
+// turn. Steps are in single precision. What that leaves to do is small and needs few digits too,
+// but for how far the rotation is off: that is taken in double.
 #pragma once
 
 #include <algorithm>
@@ -15,151 +16,213 @@
 
 namespace kerf::cpu {
 
-/// The work of some groups.
-struct RotationBatch {
-  static constexpr int kGroups = 4;
-  static constexpr int kPacks = kGroup / Pack<double>::kLanes;  // of a group
-  static_assert(kPacks % 2 == 0 && Pack<float>::kLanes == 2 * Pack<double>::kLanes);
+/// Two packs of cells in single precision, and packs in double of as many.
+using Singles = Twin<Pack<float>>;
+struct Doubles {
+  Twin<Pack<double>> of[2];
+};
+static_assert(Pack<float>::kLanes == 2 * Pack<double>::kLanes);
 
-  kernels::Mat3<Pack<double>> gradient[kGroups * kPacks];  // F of kernels/rotation.hpp
-  kernels::Quat<Pack<float>> near[kGroups * kPacks / 2];   // rotations to some 1e-7
+inline Doubles in_double(const Singles& x) {
+  Doubles out;
+  parted(x.a, out.of[0].a, out.of[0].b);
+  parted(x.b, out.of[1].a, out.of[1].b);
+  return out;
+}
+inline Singles in_single(const Doubles& x) {
+  return {joined(x.of[0].a, x.of[0].b), joined(x.of[1].a, x.of[1].b)};
+}
+
+/// Rotations as single precision has them, and what the last step needs.
+struct NearRotation {
+  kernels::Quat<Singles> q;             // of length 1
+  kernels::Sym3<Singles> half_inverse;  // of RotationStep, from some 1e-3 radians off
+  Singles::Mask done;                   // all but the last step
 };
 
+/// F of kernels/rotation.hpp for a pack of cells, by rows. Not a Mat3: arrays of those are cleared.
+using Gradient = Pack<double>[9];
+
 inline void gather_gradients(const PatchedLevel& level, std::size_t group, const double* x,
-                             kernels::Mat3<Pack<double>>* F) {
+                             Gradient* out) {
   using P = Pack<double>;
   const P side = P(level.kinds[level.kind[group]].side);
   for_corners<double>(level, group,
                       [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
                         kernels::Vec3<P> corners[8];
                         gather_corners<row()>(points, x, corners);
-                        F[first / P::kLanes] = kernels::mean_gradient(corners, side);
+                        const auto F = kernels::mean_gradient(corners, side);
+                        P* const to = out[first / P::kLanes];
+                        kernels::unrolled<9>([&](auto k) { to[k] = F[k / 3][k % 3]; });
                       });
 }
 
-/// Of the square of a step in double, radians: what follows one of 1e-6 is at most its square.
-inline constexpr double kLastStep2 = 1e-12;
-
-/// q where the mask holds, else next.
-template <class T>
-kernels::Quat<T> held(const typename T::Mask& mask, const kernels::Quat<T>& q,
-                      const kernels::Quat<T>& next) {
-  return {select(mask, q.w, next.w), select(mask, q.x, next.x), select(mask, q.y, next.y),
-          select(mask, q.z, next.z)};
+/// A matrix from entry(row, column), in one go: one that is filled later is cleared first.
+template <class T, class Entry>
+[[gnu::always_inline]] inline kernels::Mat3<T> matrix_of(const Entry& entry) {
+  return {{{entry(0, 0), entry(0, 1), entry(0, 2)},
+           {entry(1, 0), entry(1, 1), entry(1, 2)},
+           {entry(2, 0), entry(2, 1), entry(2, 2)}}};
 }
 
-/// Newton's iteration in single precision, from and to batch.near. A lane that it does not lead
-/// anywhere is left to turn_on; where F is too large for single precision it gets the identity,
-/// from numbers that normalised() finds unusable.
-KERF_FLATTEN inline void turn_nearly(RotationBatch& batch, int packs) {
-  using P = Pack<float>;
-  using T = Twin<P>;
-  constexpr int kMost = RotationBatch::kGroups * RotationBatch::kPacks / 2, kIterations = 8;
-  static_assert(kMost % 2 == 0);
-  const T near2 = T(1e-6F);  // behind a step of 1e-3 radians is one of 1e-6, or of rounding
-  for (int n = 0; n < packs; n += 2) {
-    kernels::Mat3<T> F;
-    const auto* const from = batch.gradient + 2 * n;
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        F[a][b] = {joined(from[0][a][b], from[1][a][b]), joined(from[2][a][b], from[3][a][b])};
-    kernels::Quat<P>*const first = batch.near + n, *const second = first + 1;
-    kernels::Quat<T> q{
-        {first->w, second->w}, {first->x, second->x}, {first->y, second->y}, {first->z, second->z}};
-    auto done = T(1) < T(0);  // such lanes stay, so that no lane depends on others
-    for (int i = 0; i < kIterations && !all(done); ++i) {
-      kernels::RotationStep<T> step;
-      kernels::rotation_step(F, q, step);
-      q = held(done, q, step.next);
-      done = done || !step.ascent || step.length2 <= near2;
-    }
-    q = kernels::normalised(q);
-    *first = {q.w.a, q.x.a, q.y.a, q.z.a};
-    *second = {q.w.b, q.x.b, q.y.b, q.z.b};
-  }
-}
-
-/// More steps of the lanes of a pack that are not done. Where Newton proves nothing within its
-/// steps, a lane goes the way of the reference, from `start`.
-[[gnu::noinline, gnu::cold]] inline void turn_on(const kernels::Mat3<Pack<double>>& F,
-                                                 const kernels::Quat<Pack<double>>& start,
-                                                 const PackMask<double>& done,
-                                                 kernels::Quat<Pack<double>>& q) {
-  using P = Pack<double>;
+/// Newton's iteration in single precision from near.q, until one step is left that can take the
+/// matrix of the step before: turning by w changes it by at most |w| times its spread.
+///
+/// Errors  The step that is left is one of 1e-6 radians at most, and wrong by at most 2e-6 of that.
+[[gnu::always_inline]] inline void turn_nearly(const kernels::Mat3<Singles>& F,
+                                               NearRotation& near) {
+  using T = Singles;
   constexpr int kIterations = 8;
-  const P small2 = P(kLastStep2);
-  PackMask<double> proven = done, lost{P(1).v < P(0).v};
-  for (int i = 0; i < kIterations && !all(proven || lost); ++i) {
-    kernels::RotationStep<P> step;
+  // Behind a step of 1e-3 radians is one of 1e-6, or of rounding.
+  const T small2 = T(1e-6F), spread2 = T(1e-12F);
+  kernels::Quat<T>& q = near.q;
+  near.done = T(1) < T(0);  // such lanes stay, so that no lane depends on others
+  const auto take_step = [&](auto is_first) {
+    kernels::RotationStep<T> step;
     kernels::rotation_step(F, q, step);
-    lost = lost || !(step.ascent || proven);
-    q = held(proven, q, step.next);
-    proven = proven || (step.ascent && step.length2 <= small2);
-  }
-  q = held(done, q, kernels::normalised(q));
-  for (int k = 0; k < P::kLanes; ++k) {
-    if (proven.v[k] != 0 && lost.v[k] == 0) continue;
-    kernels::Mat3<double> f;
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) f[a][b] = F[a][b][k];
-    const auto turned = kernels::extract_rotation(
-        f, kernels::Quat<double>{start.w[k], start.x[k], start.y[k], start.z[k]});
-    q.w.set(k, turned.w);
-    q.x.set(k, turned.x);
-    q.y.set(k, turned.y);
-    q.z.set(k, turned.z);
-  }
+    const auto keep = [&](T& held, const T& next) {
+      held = is_first() ? next : select(near.done, held, next);
+    };
+    keep(q.w, step.next.w);
+    keep(q.x, step.next.x);
+    keep(q.y, step.next.y);
+    keep(q.z, step.next.z);
+    keep(near.half_inverse.xx, step.half_inverse.xx);
+    keep(near.half_inverse.xy, step.half_inverse.xy);
+    keep(near.half_inverse.xz, step.half_inverse.xz);
+    keep(near.half_inverse.yy, step.half_inverse.yy);
+    keep(near.half_inverse.yz, step.half_inverse.yz);
+    keep(near.half_inverse.zz, step.half_inverse.zz);
+    near.done = near.done || (step.ascent && step.length2 <= small2 &&
+                              step.length2 * step.spread2 <= spread2 * (step.trace * step.trace));
+  };
+  take_step(std::true_type{});
+  for (int i = 1; i < kIterations && !all(near.done); ++i) take_step(std::false_type{});
+  const T length2 = fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, q.z * q.z)));
+  const T inverse = T(1) / sqrt(length2);
+  q = {q.w * inverse, q.x * inverse, q.y * inverse, q.z * inverse};
+  const auto& H = near.half_inverse;
+  near.half_inverse = {H.xx * length2, H.xy * length2, H.xz * length2,
+                       H.yy * length2, H.yz * length2, H.zz * length2};
 }
 
 /// The last step, from q of length 1 in single precision; the lanes in which it was the last one.
-template <class T>
-[[gnu::always_inline]] inline auto take_last_step(const kernels::Mat3<T>& F, kernels::Quat<T>& q) {
-  kernels::RotationStep<T> step;
-  kernels::rotation_step(F, q, step);
-  q = step.next;
-  // 1 / |q| by its series: |q|^2 - 1 is some 1e-7, and so is what single precision leaves to do.
-  const T over = fma(q.w, q.w, fma(q.x, q.x, fma(q.y, q.y, fma(q.z, q.z, T(-1)))));
-  const T less = over * fma(over, T(0.375), T(-0.5));
-  q = {fma(q.w, less, q.w), fma(q.x, less, q.x), fma(q.y, less, q.y), fma(q.z, less, q.z)};
-  return step.ascent && step.length2 <= T(kLastStep2);
+/// How far q is off is taken in double. So is q (1, w) over its length, but not w.
+[[gnu::always_inline]] inline Singles::Mask take_last_step(const Gradient* gradients,
+                                                           const NearRotation& near,
+                                                           kernels::Quat<Pack<double>> (&out)[4]) {
+  using T = Twin<Pack<double>>;
+  const auto& q = near.q;
+  const auto& H = near.half_inverse;
+  const Doubles qw = in_double(q.w), qx = in_double(q.x), qy = in_double(q.y), qz = in_double(q.z);
+  const auto at = [&](int half) {
+    return kernels::Quat<T>{qw.of[half], qx.of[half], qy.of[half], qz.of[half]};
+  };
+  Doubles off[3];
+  for (int half = 0; half < 2; ++half) {
+    const Gradient* const of = gradients + 2 * half;
+    const auto F =
+        matrix_of<T>([&](int a, int b) { return T(of[0][3 * a + b], of[1][3 * a + b]); });
+    const kernels::Vec3<T> axial = kernels::horn_axial(F, at(half));
+    off[0].of[half] = axial.x;
+    off[1].of[half] = axial.y;
+    off[2].of[half] = axial.z;
+  }
+  const Singles x = in_single(off[0]), y = in_single(off[1]), z = in_single(off[2]);
+  const kernels::Vec3<Singles> w{fma(H.xx, x, fma(H.xy, y, H.xz * z)),
+                                 fma(H.xy, x, fma(H.yy, y, H.yz * z)),
+                                 fma(H.xz, x, fma(H.yz, y, H.zz * z))};
+  const Doubles wx = in_double(w.x), wy = in_double(w.y), wz = in_double(w.z);
+  for (int half = 0; half < 2; ++half) {
+    const kernels::Quat<T> start = at(half);
+    const kernels::Quat<T> to =
+        kernels::turned_on(start, start, {wx.of[half], wy.of[half], wz.of[half]});
+    // 1 / length - 1 by its series: what single precision leaves to do is some 1e-7.
+    const T over = fma(to.w, to.w, fma(to.x, to.x, fma(to.y, to.y, fma(to.z, to.z, T(-1)))));
+    const T less = over * fma(over, T(0.375), T(-0.5));
+    const kernels::Quat<T> unit{fma(to.w, less, to.w), fma(to.x, less, to.x), fma(to.y, less, to.y),
+                                fma(to.z, less, to.z)};
+    out[2 * half] = {unit.w.a, unit.x.a, unit.y.a, unit.z.a};
+    out[2 * half + 1] = {unit.w.b, unit.x.b, unit.y.b, unit.z.b};
+  }
+  const Singles quarter2 = fma(w.x, w.x, fma(w.y, w.y, w.z * w.z));
+  return near.done && quarter2 <= Singles(0.25e-12F);
 }
 
-/// Rotations of some groups, at most RotationBatch::kGroups, from the displacements.
+/// Stores the lanes of two packs that are done. The others, which Newton leads nowhere or not so
+/// soon, go the way of the reference from where they were.
+template <class S>
+[[gnu::noinline, gnu::cold]] void store_some(const Gradient* gradients, const PackMask<float>& done,
+                                             const kernels::Quat<Pack<double>>* q,
+                                             std::size_t group, int first_lane,
+                                             FinestRotations<S>& rotations) {
+  constexpr int kLanes = Pack<double>::kLanes;
+  const std::size_t first = kGroup * group + static_cast<std::size_t>(first_lane);
+  std::array<std::array<double, 4>, 2 * kLanes> turned;
+  for (int k = 0; k < 2 * kLanes; ++k) {
+    if (done.v[k] != 0) continue;
+    const auto F = matrix_of<double>(
+        [&](int a, int b) { return gradients[k / kLanes][3 * a + b][k % kLanes]; });
+    const auto from = rotations.at(first + static_cast<std::size_t>(k));
+    const auto best =
+        kernels::extract_rotation(F, kernels::Quat<double>{from[0], from[1], from[2], from[3]});
+    turned[k] = {best.w, best.x, best.y, best.z};
+  }
+  rotations.store(group, first_lane, q[0]);
+  rotations.store(group, first_lane + kLanes, q[1]);
+  for (int k = 0; k < 2 * kLanes; ++k)
+    if (done.v[k] == 0) rotations.put(first + static_cast<std::size_t>(k), turned[k]);
+}
+
+/// Groups of which each part of the work is done before the next: two packs in single precision,
+/// twice.
+inline constexpr int kTwins = 2;
+inline constexpr int kRotatedGroups = std::max(1, kTwins * 2 * Pack<float>::kLanes / kGroup);
+
+/// Rotations of some groups, at most kRotatedGroups, from the displacements.
 template <class S>
 KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& rotations,
                                 std::size_t begin, int count, const double* x) {
-  using P = Pack<double>;
-  using T = Twin<P>;
-  constexpr int kPacks = RotationBatch::kPacks, kHalf = kPacks / 2;
-  RotationBatch batch;
-  const int gathered = count + kHalf * count % 2;  // the last one twice, for a whole twin
-  for (int g = 0; g < gathered; ++g) {
+  constexpr int kDoubles = kGroup / Pack<double>::kLanes;  // packs of a group
+  constexpr int kSingles = kDoubles / 2;
+  static_assert(kSingles * kRotatedGroups == 2 * kTwins);
+  Gradient gradients[4 * kTwins];
+  NearRotation near[kTwins];
+  const auto group_of = [&](int n) { return begin + static_cast<std::size_t>(n / kSingles); };
+  const auto lane_of = [](int n) { return n % kSingles * Pack<float>::kLanes; };
+  const int packs = kSingles * count, twins = (packs + 1) / 2;
+  for (int g = 0; g < 2 * twins / kSingles; ++g) {  // the last one twice, for a whole twin
     const std::size_t group = begin + static_cast<std::size_t>(std::min(g, count - 1));
     rotations.prefetch_to_store(group);
-    gather_gradients(level, group, x, batch.gradient + kPacks * g);
-    for (int n = 0; n < kHalf; ++n)
-      batch.near[kHalf * g + n] = rotations.template load<float>(group, n * Pack<float>::kLanes);
+    gather_gradients(level, group, x, gradients + kDoubles * g);
   }
-  turn_nearly(batch, kHalf * count);
-  for (int n = 0; n < kHalf * count; ++n) {
-    const std::size_t group = begin + static_cast<std::size_t>(n / kHalf);
-    const int first = 2 * (n % kHalf) * P::kLanes, second = first + P::kLanes;
-    const kernels::Mat3<P>* const F = batch.gradient + 2 * n;
-    kernels::Mat3<T> both;
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) both[a][b] = {F[0][a][b], F[1][a][b]};
-    const kernels::Quat<Pack<float>>& near = batch.near[n];
-    kernels::Quat<T> q;
-    parted(near.w, q.w.a, q.w.b);
-    parted(near.x, q.x.a, q.x.b);
-    parted(near.y, q.y.a, q.y.b);
-    parted(near.z, q.z.a, q.z.b);
-    const auto done = take_last_step(both, q);
-    kernels::Quat<P> q0{q.w.a, q.x.a, q.y.a, q.z.a}, q1{q.w.b, q.x.b, q.y.b, q.z.b};
-    if (!all(done.a)) turn_on(F[0], rotations.template load<double>(group, first), done.a, q0);
-    if (!all(done.b)) turn_on(F[1], rotations.template load<double>(group, second), done.b, q1);
-    rotations.store(group, first, q0);
-    rotations.store(group, second, q1);
+  for (int t = 0; t < twins; ++t) {
+    const Gradient* const of = gradients + 4 * t;
+    const auto F = matrix_of<Singles>([&](int a, int b) {
+      const int k = 3 * a + b;
+      return Singles(joined(of[0][k], of[1][k]), joined(of[2][k], of[3][k]));
+    });
+    const auto start = [&](int n) {
+      return rotations.template load<float>(group_of(n), lane_of(n));
+    };
+    const auto q = start(2 * t), r = start(std::min(2 * t + 1, packs - 1));
+    near[t].q = {{q.w, r.w}, {q.x, r.x}, {q.y, r.y}, {q.z, r.z}};
+    turn_nearly(F, near[t]);
+  }
+  for (int t = 0; t < twins; ++t) {
+    kernels::Quat<Pack<double>> q[4];
+    const Singles::Mask done = take_last_step(gradients + 4 * t, near[t], q);
+    for (int i = 0; i < 2; ++i) {
+      const int n = 2 * t + i;
+      if (n == packs) break;
+      const PackMask<float>& lanes = i == 0 ? done.a : done.b;
+      if (!all(lanes)) {
+        store_some(gradients + 2 * n, lanes, q + 2 * i, group_of(n), lane_of(n), rotations);
+        continue;
+      }
+      rotations.store(group_of(n), lane_of(n), q[2 * i]);
+      rotations.store(group_of(n), lane_of(n) + Pack<double>::kLanes, q[2 * i + 1]);
+    }
   }
 }
 

@@ -101,6 +101,53 @@ TEST(RotationNewton, ConvergesQuadraticallyFromTenDegrees) {
   EXPECT_LT(worst[2], 1e-11);
 }
 
+// From quaternions of any length: both grow with its square.
+TEST(RotationStep, TellsTheMatrixThatItSolvedWith) {
+  Random random(31);
+  int ascents = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Eigen::Quaterniond q = random.quaternion();
+    const double length = random.uniform(0.5, 2);
+    const Matrix3 F = q.toRotationMatrix() * (Matrix3::Identity() + 0.2 * random.matrix3());
+    const Eigen::Quaterniond near =
+        q * Eigen::AngleAxisd(
+                0.3, Vector3(random.normal(), random.normal(), random.normal()).normalized());
+    const auto scaled = to_quat<double>(near);
+    kernels::RotationStep<double> step;
+    kernels::rotation_step(
+        to_mat3<double>(F),
+        {length * scaled.w, length * scaled.x, length * scaled.y, length * scaled.z}, step);
+    const Matrix3 A = near.toRotationMatrix().transpose() * F;
+    const Matrix3 H = A.trace() * Matrix3::Identity() - 0.5 * (A + A.transpose());
+    const Matrix3 apart = H - H.trace() / 3 * Matrix3::Identity();
+    const double square = length * length;
+    ASSERT_NEAR(step.trace, square * H.trace(), 1e-13 * square);
+    ASSERT_NEAR(step.spread2, square * square * apart.squaredNorm(), 1e-12 * square * square);
+    if (!step.ascent) continue;
+    ++ascents;
+    const Matrix3 half = to_eigen(step.half_inverse.full());
+    ASSERT_LT((2 * square * half * H - Matrix3::Identity()).norm(), 1e-12 * H.inverse().norm());
+  }
+  EXPECT_GT(ascents, 1000);
+}
+
+// Without R, and small where the rotation is nearly the best: no digits are lost to what cancels.
+TEST(HornAxial, IsTheAxialVectorOfTheTurnedGradient) {
+  Random random(32);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Matrix3 F = random.matrix3();
+    const Eigen::Quaterniond q = random.quaternion();
+    const double length = random.uniform(0.5, 2);
+    const auto scaled = to_quat<double>(q);
+    const Matrix3 A = length * length * q.toRotationMatrix().transpose() * F;
+    const auto axial = kernels::horn_axial(
+        to_mat3<double>(F),
+        {length * scaled.w, length * scaled.x, length * scaled.y, length * scaled.z});
+    const Vector3 expected(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
+    ASSERT_LT((Vector3(axial.x, axial.y, axial.z) - expected).norm(), 2e-14 * F.norm());
+  }
+}
+
 TEST(ExtractRotation, AtRestStaysTheIdentityToTheBit) {
   const Quat<double> one{};
   EXPECT_EQ(extract_rotation(Mat3<double>::identity(), one), one);
