@@ -8,6 +8,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
 
 #include "cpu/fast_kernels.hpp"
 #include "cpu/finest_values.hpp"
@@ -65,16 +69,26 @@ template <class T, class Entry>
            {entry(2, 0), entry(2, 1), entry(2, 2)}}};
 }
 
+/// Radians. Behind a step of kNearStep is one of 1e-6, or of rounding.
+inline constexpr float kNearStep = 1e-3F;
+/// Turning by an angle changes the matrix of a step, to first order, by less than the angle times
+/// its spread. A step that takes the matrix of the step before may be wrong by this part of itself,
+/// times the trace of the matrix over its least eigenvalue.
+inline constexpr float kStale = 1e-6F;
+/// Radians; some 1e-7 is usual. A guard, and no comparison holds for what is no number.
+inline constexpr float kLastStep = 1e-6F;
+
 /// Newton's iteration in single precision from near.q, until one step is left that can take the
-/// matrix of the step before: turning by w changes it by at most |w| times its spread.
+/// matrix of the step before.
 ///
-/// Errors  The step that is left is one of 1e-6 radians at most, and wrong by at most 2e-6 of that.
+/// Errors  The step that is left is one of kLastStep at most: wrong by 1e-12 times trace over least
+///         eigenvalue.
 [[gnu::always_inline]] inline void turn_nearly(const kernels::Mat3<Singles>& F,
                                                NearRotation& near) {
   using T = Singles;
   constexpr int kIterations = 8;
-  // Behind a step of 1e-3 radians is one of 1e-6, or of rounding.
-  const T small2 = T(1e-6F), spread2 = T(1e-12F);
+  const T near2 = T(kNearStep * kNearStep), stale2 = T(kStale * kStale);
+  const T least = T(1e-9F);  // whose cube keeps its digits
   kernels::Quat<T>& q = near.q;
   near.done = T(1) < T(0);  // such lanes stay, so that no lane depends on others
   const auto take_step = [&](auto is_first) {
@@ -93,8 +107,8 @@ template <class T, class Entry>
     keep(near.half_inverse.yy, step.half_inverse.yy);
     keep(near.half_inverse.yz, step.half_inverse.yz);
     keep(near.half_inverse.zz, step.half_inverse.zz);
-    near.done = near.done || (step.ascent && step.length2 <= small2 &&
-                              step.length2 * step.spread2 <= spread2 * (step.trace * step.trace));
+    near.done = near.done || (step.ascent && step.trace > least && step.length2 <= near2 &&
+                              step.length2 * step.spread2 <= stale2 * (step.trace * step.trace));
   };
   take_step(std::true_type{});
   for (int i = 1; i < kIterations && !all(near.done); ++i) take_step(std::false_type{});
@@ -107,7 +121,8 @@ template <class T, class Entry>
 }
 
 /// The last step, from q of length 1 in single precision; the lanes in which it was the last one.
-/// How far q is off is taken in double. So is q (1, w) over its length, but not w.
+/// How far q is off is taken in double. So is q (1, w) over its length, but not w, half of the
+/// rotation vector.
 [[gnu::always_inline]] inline Singles::Mask take_last_step(const Gradient* gradients,
                                                            const NearRotation& near,
                                                            kernels::Quat<Pack<double>> (&out)[4]) {
@@ -145,8 +160,8 @@ template <class T, class Entry>
     out[2 * half] = {unit.w.a, unit.x.a, unit.y.a, unit.z.a};
     out[2 * half + 1] = {unit.w.b, unit.x.b, unit.y.b, unit.z.b};
   }
-  const Singles quarter2 = fma(w.x, w.x, fma(w.y, w.y, w.z * w.z));
-  return near.done && quarter2 <= Singles(0.25e-12F);
+  const Singles half2 = fma(w.x, w.x, fma(w.y, w.y, w.z * w.z));  // w is half of the rotation
+  return near.done && half2 <= Singles(0.25F * kLastStep * kLastStep);
 }
 
 /// Stores the lanes of two packs that are done. The others, which Newton leads nowhere or not so

@@ -14,8 +14,8 @@
 namespace kerf::cpu {
 
 /// While it lives, this thread takes results and operands below the least normal number for zero.
-/// Every thread of a loop has one, so that the bits do not depend on which one does what. No effect
-/// but on x86.
+/// Every thread of a loop has one, so that the bits do not depend on which one does what. Flags of
+/// exceptions that were raised meanwhile are lost. No effect but on x86.
 class FlushToZero {
  public:
 #if defined(__SSE2__)

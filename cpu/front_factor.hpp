@@ -43,7 +43,7 @@ class FrontFactor {
     std::atomic<bool> good = true;
     using Buffer = PointBuffer<double>;
     for (const std::vector<int>& fronts : fronts_.by_depth)
-      for_patches(
+      for_parts(
           0, static_cast<std::int32_t>(fronts.size()), threads,
           [] { return std::make_unique<Buffer>(); },
           [&](std::int32_t n, Buffer& buffer) {
@@ -65,10 +65,10 @@ class FrontFactor {
       whole[4 * v + 3] = 0;
     }
     const auto each_branch = [&](const auto& body) {
-      for_patches(0, static_cast<std::int32_t>(fronts_.branches.size()), threads,
-                  [&](std::int32_t b) {
-                    body(fronts_.branches[b], local_[static_cast<std::size_t>(b) + 1].data());
-                  });
+      for_parts(0, static_cast<std::int32_t>(fronts_.branches.size()), threads,
+                [&](std::int32_t b) {
+                  body(fronts_.branches[b], local_[static_cast<std::size_t>(b) + 1].data());
+                });
     };
     each_branch([&](const std::vector<int>& branch, double* local) {
       std::copy_n(whole, 4 * vertices, local);

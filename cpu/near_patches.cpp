@@ -199,7 +199,7 @@ NearCells find_near(const PatchedLevel& level, double spacing, std::span<const d
                     const BladeReach& reach, std::span<const std::int32_t> opened, int threads) {
   const NearPatches near(level, spacing, displacement, reach);
   std::vector<NearCells> parts(level.patches.size());
-  for_patches(
+  for_parts(
       0, static_cast<std::int32_t>(parts.size()), threads,
       [] { return std::make_unique<std::vector<RoundedPlace>>(); },
       [&](std::int32_t p, std::vector<RoundedPlace>& at) {

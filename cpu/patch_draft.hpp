@@ -71,8 +71,8 @@ class Marks {
 /// Runs body(i, local) for i from begin to end on some threads, each with a `local` of its own that
 /// make() gives.
 template <class Make, class Body>
-void for_patches(std::int32_t begin, std::int32_t end, int threads, const Make& make,
-                 const Body& body) {
+void for_parts(std::int32_t begin, std::int32_t end, int threads, const Make& make,
+               const Body& body) {
   if (begin >= end) return;
   ParallelErrors errors;
 #pragma omp parallel num_threads(std::min(threads, end - begin)) if (end - begin > 1)

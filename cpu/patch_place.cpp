@@ -27,8 +27,8 @@ void PatchPlacer::place(std::vector<Draft>& drafts, const std::vector<std::int32
   for (const Draft& draft : drafts) place_own(draft);
   set_fixed();
   fit_ranges();
-  for_patches(0, size_of(drafts.size()), threads_,
-              [&](std::int32_t i) { PatchWriter(level_, drafts[i], out_).write(); });
+  for_parts(0, size_of(drafts.size()), threads_,
+            [&](std::int32_t i) { PatchWriter(level_, drafts[i], out_).write(); });
   for (const Draft& draft : drafts)
     if (draft.moves_cells()) moves.groups.push_back(out_.patches[draft.patch].groups);
   list_copies();
@@ -317,7 +317,7 @@ void PatchPlacer::fill(std::int32_t cell) {
 }
 
 void PatchPlacer::place_children() {
-  for_patches(0, size_of(drafts_->size()), threads_, [&](std::int32_t i) {
+  for_parts(0, size_of(drafts_->size()), threads_, [&](std::int32_t i) {
     const Draft& draft = (*drafts_)[i];
     for (const auto* cells : {&draft.cells, &draft.refilled})
       for (const std::int32_t c : *cells)

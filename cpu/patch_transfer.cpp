@@ -442,7 +442,7 @@ void place_transfers(const std::vector<std::int32_t>& patches, const PatchMoves&
   const auto count = size_of(patches.size());
   const FirstCells first(*level.level);
   std::vector<TransferDraft> drafts(patches.size());
-  for_patches(
+  for_parts(
       0, count, threads, [&] { return std::make_unique<TransferRows>(level, next, first, moves); },
       [&](std::int32_t i, TransferRows& rows) { drafts[i] = rows(patches[i]); });
   t.parts.resize(level.patches.size());

@@ -236,7 +236,7 @@ class Patcher {
   /// body(i) for i below `count`, on all threads; those of one chunk by one of them.
   template <class Body>
   void in_chunks(std::size_t count, const Body& body) const {
-    for_patches(0, size_of(chunks_of(count)), threads_, [&](std::int32_t chunk) {
+    for_parts(0, size_of(chunks_of(count)), threads_, [&](std::int32_t chunk) {
       const std::size_t first = kChunk * static_cast<std::size_t>(chunk);
       for (std::size_t i = first; i < std::min(first + kChunk, count); ++i) body(i);
     });
@@ -445,7 +445,7 @@ class Patcher {
   }
 
   void make_drafts() {
-    for_patches(
+    for_parts(
         0, size_of(drafts_.size()), threads_, [&] { return std::make_unique<Numbering>(out_); },
         [&](std::int32_t i, Numbering& numbering) {
           if (!drafts_[i].anew) find_lost(drafts_[i]);

@@ -71,7 +71,7 @@ KERF_HD Quat<T> turned_on(const Quat<T>& p, const Quat<T>& q, const Vec3<T>& w) 
 ///
 /// Needs  |q|^2 F neither so large nor so small that its cube over- or underflows: in single
 ///        precision the q of five steps, each from near a half turn, comes close. Where it is, the
-///        next q may be no number, without ascent.
+///        next q may be no number, without ascent; next to underflow the inverse has few digits.
 template <class T>
 KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& out) {
   // det > 1e-3 tr^3 keeps the smallest eigenvalue above 0.4 % of the trace; at rest the ratio is
@@ -89,9 +89,12 @@ KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& 
           cyz = fma(sxy, sxz, hxx * syz);
   const T det = fma(hxx, cxx, -fma(sxy, cxy, sxz * cxz));
   const T trace = hxx + hyy + hzz;
-  // Near a half turn hxx and hyy can be rounding above zero, with det and trace below.
-  const auto ascent =
-      hxx > T(0) && czz > T(0) && trace > T(0) && det > kSafe * (trace * trace * trace);
+  const T off = fma(sxy, sxy, fma(sxz, sxz, syz * syz));
+  const T squares = fma(hxx, hxx, fma(hyy, hyy, fma(hzz, hzz, off + off)));
+  // Near a half turn hxx and hyy can be rounding above zero, with det and trace below; and so can
+  // all be whose trace is small beside the matrix. Of a positive definite one the trace is greater.
+  const auto ascent = hxx > T(0) && czz > T(0) && trace > T(0) && squares <= trace * trace &&
+                      det > kSafe * (trace * trace * trace);
   const T half = select(ascent, T(0.5) / select(ascent, det, T(1)), T(0));
   const Vec3<T> w{half * fma(cxx, axial.x, fma(cxy, axial.y, cxz * axial.z)),
                   half * fma(cxy, axial.x, fma(cyy, axial.y, cyz * axial.z)),
@@ -101,9 +104,7 @@ KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& 
   out.ascent = ascent;
   out.half_inverse = {half * cxx, half * cxy, half * cxz, half * cyy, half * cyz, half * czz};
   out.trace = trace;
-  const T off = fma(sxy, sxy, fma(sxz, sxz, syz * syz));
-  const T all = fma(hxx, hxx, fma(hyy, hyy, fma(hzz, hzz, off + off)));
-  out.spread2 = fma(T(-1.0 / 3.0), trace * trace, all);
+  out.spread2 = fma(T(-1.0 / 3.0), trace * trace, squares);
 }
 
 /// A fixed number of Newton steps; the fast path for cells that are neither inverted nor collapsed.

@@ -96,11 +96,13 @@ TEST(FastRotations, AreTheBestForAnyDisplacement) {
 // From rotations a little off, by less and by more than what one step, or two, can mend: the last
 // step takes the matrix of the step before, which must not have been too far away for the strain.
 TEST(FastRotations, AreTheBestFromWhereverTheyWere) {
+  // Many more quaternions than elsewhere: of some all four components are rounded by half a unit.
+  constexpr double kTwoParts = 0x1p-48;
   const Problem p = uniform_body({16, 6, 5});
   std::vector<double> q(4 * p.hierarchy.values.size());
   Met met;
   for (const std::string machine : {"fast", "mixed"})
-    for (const double strain : {0.003, 0.03, 0.3}) {
+    for (const double strain : {0.0, 1e-6, 0.003, 0.03, 0.3}) {
       const auto backend = test::make_backend(machine);
       const int u = backend->add_vector();
       backend->load(p.hierarchy);
@@ -115,8 +117,43 @@ TEST(FastRotations, AreTheBestFromWhereverTheyWere) {
         backend->read_rotations(q);
         for (std::int32_t c = 0; c < p.hierarchy.levels[0].cells(); ++c)
           ASSERT_NO_FATAL_FAILURE(expect_best(gradient_of(p, c, x), matrix_of(q, c),
-                                              machine == "fast" ? 0x1p-52 : 0x1p-48, met));
+                                              machine == "fast" ? 0x1p-52 : kTwoParts, met));
       }
+    }
+}
+
+// Stationary, at the start, to the bit, and no maximum; with a matrix of the step whose trace is so
+// small beside it that rounding in single precision makes it look positive definite.
+TEST(FastRotations, LeaveAPointThatIsNoMaximum) {
+  const double gradients[][9] = {
+      {-0.045780829640731838, -0.20880465651931854, 0.05562992722615949, -0.20880465651931854,
+       -0.91884171643836277, 0.24529614032724112, 0.05562992722615949, 0.24529614032724112,
+       0.96621024775362918},
+      {-0.97984103165945247, -0.13754640964085815, 8.2879260410593118e-05, -0.13754640964085815,
+       -0.018423375070398321, -3.0877349998371813e-05, 8.2879260410593118e-05,
+       -3.0877349998371813e-05, 0.99913220793147706}};
+  const Problem p = uniform_body({2, 1, 1});
+  const Level& finest = p.hierarchy.levels[0];
+  for (const std::string machine : {"cpu", "fast", "mixed"})
+    for (const auto& of : gradients) {
+      const Matrix3 F = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(of);
+      const auto backend = test::make_backend(machine);
+      const int u = backend->add_vector();
+      backend->load(p.hierarchy);
+      Vector x(p.unknowns(0));
+      for (std::int32_t v = 0; v < finest.vertices(); ++v) {
+        const auto& at = finest.point[v];
+        x.segment<3>(3 * v) =
+            p.physics.spacing * (F - Matrix3::Identity()) * oracle::Vector3(at[0], at[1], at[2]);
+      }
+      test::write(*backend, 0, u, x);
+      backend->rotate_cells(u);
+      std::vector<double> q(4 * p.hierarchy.values.size());
+      backend->read_rotations(q);
+      Met met;
+      for (std::int32_t c = 0; c < finest.cells(); ++c)
+        ASSERT_NO_FATAL_FAILURE(expect_best(gradient_of(p, c, x), matrix_of(q, c), 0x1p-49, met))
+            << machine;
     }
 }
 
@@ -157,7 +194,7 @@ TEST(FastRotations, DependOnNoOtherCell) {
         }
       }
       const Matrix3 R = matrix_of(q, c);
-  ASSERT_LT((R.transpose() * R - Matrix3::Identity()).norm(), 16 * rounding);
+      ASSERT_LT((R.transpose() * R - Matrix3::Identity()).norm(), 16 * rounding);
       if (!other && std::abs(far) < 100) {
         ASSERT_NO_FATAL_FAILURE(expect_best(gradient_of(p, c, moved), R, rounding, met));
       }

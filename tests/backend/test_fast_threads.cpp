@@ -3,8 +3,10 @@
 // The fast backend on several threads, and of a body that no blade will meet: the same bits.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include "core/base/error.hpp"
 #include "core/body/cut.hpp"
@@ -37,6 +39,63 @@ TEST(FastBackend, GivesTheSameBitsForAnyNumberOfThreads) {
       EXPECT_EQ(std::memcmp(more.x.data(), one.x.data(), sizeof(double) * p.unknowns(0)), 0)
           << machine << ", " << threads << " threads";
     }
+  }
+}
+
+#if defined(__SSE2__)
+// On any thread, in loops that are worth several threads and in those that are not.
+TEST(FastBackend, TakesSubnormalNumbersForZero) {
+  constexpr double kSubnormal = 1e-39;  // in single precision
+  const Problem large = test::large_cut_block();
+  const Problem small = test::cut_block({6, 5, 4}, {3.3, 2.2, 2.1}, 5, 60);
+  ASSERT_GE(large.hierarchy.levels[0].cells(), 2048) << "one thread does all";
+  for (const Problem* p : {&large, &small})
+    for (const int threads : {1, 2, 3}) {
+      const Loaded loaded(*p, test::make_backend("mixed", threads), kDynamic, {}, p->deformation());
+      Backend& backend = *loaded.backend;
+      for (int l = 0; l + 1 < p->levels(); ++l) {
+        SCOPED_TRACE(::testing::Message() << threads << " threads, level " << l);
+        const Vector tiny = Vector::Constant(p->unknowns(l), kSubnormal);
+        backend.zero(l, kRight);
+        test::write(backend, l, kSolution, tiny);
+        ASSERT_GT(p->read(backend, l, kSolution).norm(), 0) << "they can be stored";
+        backend.residual(l);
+        EXPECT_EQ(p->read(backend, l, kResidual).norm(), 0);
+        backend.apply(l, kSolution, kResidual);
+        EXPECT_EQ(p->read(backend, l, kResidual).norm(), 0);
+        test::write(backend, l, kResidual, tiny);
+        EXPECT_EQ(backend.dot(l, kResidual, kSolution), 0);
+        backend.restrict_residual(l);
+        EXPECT_EQ(p->read(backend, l + 1, kRight).norm(), 0);
+      }
+    }
+}
+#endif
+
+// Of a body that bends in a plane rounding leaves rotations whose squares are subnormal.
+TEST(FastBackend, GivesTheSameBitsWhereRotationsAreNearlyInAPlane) {
+  const Problem p = test::large_cut_block();
+  std::vector<Vector> found;
+  for (const int threads : {1, 2, 3}) {
+    const Loaded loaded(p, test::make_backend("mixed", threads), kDynamic, {}, p.deformation());
+    Backend& backend = *loaded.backend;
+    std::vector<double> q;
+    for (std::int32_t c = 0; c < p.hierarchy.levels[0].cells(); ++c) {
+      const double angle = 0.001 * c;
+      q.insert(q.end(), {std::cos(angle), 3e-20 * c, -1e-21 * c, std::sin(angle)});
+    }
+    backend.write_rotations(q);
+    std::vector<Vector> of;
+    for (int l = 0; l + 1 < p.levels(); ++l) backend.coarsen(l);
+    for (int l = 0; l + 1 < p.levels(); ++l) {
+      backend.prepare(l);
+      test::write(backend, l, kRight, p.free_vector(l, 8));
+      backend.zero(l, kSolution);
+      backend.smooth(l, SweepOrder::forward, 2);
+      of.push_back(p.read(backend, l, kSolution));
+    }
+    if (found.empty()) found = of;
+    for (std::size_t l = 0; l < of.size(); ++l) EXPECT_EQ(of[l], found[l]) << threads << ", " << l;
   }
 }
 

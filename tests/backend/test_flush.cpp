@@ -32,8 +32,8 @@ TEST(FlushToZero, LastsAsLongAsItLives) {
   EXPECT_GT(small_square(), 0.0F);
 }
 
-// On the thread that calls as on others, and not in what the host lends its threads to.
-TEST(FlushToZero, HoldsOnAllThreadsOfPatches) {
+// And not in what the host lends its threads to.
+TEST(FlushToZero, HoldsInPatches) {
   for (const int threads : {1, 2, 3}) {
     float of[8];
     cpu::for_patches(0, 8, threads, [&](std::int32_t i) { of[i] = small_square(); });
