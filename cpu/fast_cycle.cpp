@@ -202,8 +202,7 @@ void FastBackend<S>::sum_given(int fine, const S* given) {
   const Transfer& transfer = levels_[fine].patched.transfer;
   S* f = to.at(kRight);
   const bool is_worth = levels_[fine].patched.cell.size() >= kWorthCells;
-  const std::int32_t worth = is_worth ? 0 : to.tiles() + 1;  // tiles: all, or more than there are
-  parallel(to.tiles(), worth, [&](std::int32_t t) {
+  parallel(0, to.tiles(), is_worth, [&](std::int32_t t) {
     const auto tile = static_cast<std::size_t>(t);
     for_packs<S>([&](int first) {
       alignas(kPackBytes) S sums[4 * Pack<S>::kLanes] = {};

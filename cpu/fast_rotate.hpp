@@ -149,9 +149,8 @@ inline constexpr float kLastStep = 1e-6F;
                                  fma(H.xz, x, fma(H.yz, y, H.zz * z))};
   const Doubles wx = in_double(w.x), wy = in_double(w.y), wz = in_double(w.z);
   for (int half = 0; half < 2; ++half) {
-    const kernels::Quat<T> start = at(half);
     const kernels::Quat<T> to =
-        kernels::turned_on(start, start, {wx.of[half], wy.of[half], wz.of[half]});
+        kernels::turned_on(at(half), {wx.of[half], wy.of[half], wz.of[half]});
     // 1 / length - 1 by its series: what single precision leaves to do is some 1e-7.
     const T over = fma(to.w, to.w, fma(to.x, to.x, fma(to.y, to.y, fma(to.z, to.z, T(-1)))));
     const T less = over * fma(over, T(0.375), T(-0.5));

@@ -213,24 +213,25 @@ class FastBackend final : public Backend {
                       std::span<const std::int32_t> opened) const override;
 
  private:
+  /// body(i), for i from begin to end; on one thread if the work is not worth more.
   template <class Body>
-  void parallel(std::int32_t count, std::int32_t worth, const Body& body) const {
-#pragma omp parallel num_threads(threads_) if (count >= worth)
+  void parallel(std::int32_t begin, std::int32_t end, bool is_worth, const Body& body) const {
+#pragma omp parallel num_threads(threads_) if (is_worth)
     {
       const FlushToZero flush;
 #pragma omp for schedule(static)
-      for (std::int32_t i = 0; i < count; ++i) body(i);
+      for (std::int32_t i = begin; i < end; ++i) body(i);
     }
+  }
+  template <class Body>
+  void parallel(std::int32_t count, std::int32_t worth, const Body& body) const {
+    parallel(0, count, count >= worth, body);
   }
   /// body(tile), for tiles of vertices.
   template <class Body>
   void for_tiles(std::int32_t begin, std::int32_t end, const Body& body) const {
-#pragma omp parallel num_threads(threads_) if (end - begin >= kWorthTiles)
-    {
-      const FlushToZero flush;
-#pragma omp for schedule(static)
-      for (std::int32_t t = begin; t < end; ++t) body(static_cast<std::size_t>(t));
-    }
+    parallel(begin, end, end - begin >= kWorthTiles,
+             [&](std::int32_t t) { body(static_cast<std::size_t>(t)); });
   }
   /// body(patch), for the patches of a level.
   template <class Body>

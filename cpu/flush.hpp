@@ -24,17 +24,14 @@ class FlushToZero {
     _mm_setcsr(before_ | kResults | kOperands);
   }
   ~FlushToZero() { _mm_setcsr(before_); }
-
- private:
-  unsigned before_;
-
- public:
 #else
   FlushToZero() {}
-  ~FlushToZero() {}
 #endif
   FlushToZero(const FlushToZero&) = delete;
   FlushToZero& operator=(const FlushToZero&) = delete;
+
+ private:
+  [[maybe_unused]] unsigned before_ = 0;
 };
 
 }  // namespace kerf::cpu

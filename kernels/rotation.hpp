@@ -29,19 +29,14 @@ namespace kerf::kernels {
 /// Shapes  u: 8 corners (of the cell, not slots: unfold first).
 template <class T>
 KERF_HD Mat3<T> mean_gradient(const Vec3<T> (&u)[kCorners], T side) {
+  const Vec3<T> mode[3] = {((u[1] - u[0]) + (u[3] - u[2])) + ((u[5] - u[4]) + (u[7] - u[6])),
+                           ((u[2] - u[0]) + (u[3] - u[1])) + ((u[6] - u[4]) + (u[7] - u[5])),
+                           ((u[4] - u[0]) + (u[5] - u[1])) + ((u[6] - u[2]) + (u[7] - u[3]))};
   const T scale = T(1) / (T(4) * side);
-  const auto gradient = [&](int c, int identity) {
-    // From the four diagonals of the cell. A line of eleven operations, not of three times seven.
-    const T a = u[7][c] - u[0][c], b = u[6][c] - u[1][c], d = u[5][c] - u[2][c],
-            e = u[4][c] - u[3][c];
-    const T ab = a + b, de = d + e;
-    const auto entry = [&](int axis, const T& mode) {
-      return axis == identity ? fma(scale, mode, T(1)) : scale * mode;
-    };
-    return Vec3<T>{entry(0, (a - b) + (d - e)), entry(1, ab - de), entry(2, ab + de)};
-  };
-  const Vec3<T> x = gradient(0, 0), y = gradient(1, 1), z = gradient(2, 2);
-  return {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}};
+  const auto less_identity = [&](int c, int a) { return scale * mode[a][c]; };
+  return {{{T(1) + less_identity(0, 0), less_identity(0, 1), less_identity(0, 2)},
+           {less_identity(1, 0), T(1) + less_identity(1, 1), less_identity(1, 2)},
+           {less_identity(2, 0), less_identity(2, 1), T(1) + less_identity(2, 2)}}};
 }
 
 template <class T>
@@ -54,14 +49,14 @@ struct RotationStep {
   T spread2;  // sum of squares of tr(S) I - S less its mean, times |q|^4, to roundings of trace^2
 };
 
-/// p + q times (0, w).
+/// q times (1, w).
 template <class T>
-KERF_HD Quat<T> turned_on(const Quat<T>& p, const Quat<T>& q, const Vec3<T>& w) {
+KERF_HD Quat<T> turned_on(const Quat<T>& q, const Vec3<T>& w) {
   const Vec3<T> less = -w;
-  return {fma(q.x, less.x, fma(q.y, less.y, fma(q.z, less.z, p.w))),
-          fma(q.w, w.x, fma(q.y, w.z, fma(q.z, less.y, p.x))),
-          fma(q.w, w.y, fma(q.z, w.x, fma(q.x, less.z, p.y))),
-          fma(q.w, w.z, fma(q.x, w.y, fma(q.y, less.x, p.z)))};
+  return {fma(q.x, less.x, fma(q.y, less.y, fma(q.z, less.z, q.w))),
+          fma(q.w, w.x, fma(q.y, w.z, fma(q.z, less.y, q.x))),
+          fma(q.w, w.y, fma(q.z, w.x, fma(q.x, less.z, q.y))),
+          fma(q.w, w.z, fma(q.x, w.y, fma(q.y, less.x, q.z)))};
 }
 
 /// One Newton step for the maximum of tr(R^T F): omega = (tr(S) I - S)^-1 axial(R^T F), applied as
@@ -99,7 +94,7 @@ KERF_HD void rotation_step(const Mat3<T>& F, const Quat<T>& q, RotationStep<T>& 
   const Vec3<T> w{half * fma(cxx, axial.x, fma(cxy, axial.y, cxz * axial.z)),
                   half * fma(cxy, axial.x, fma(cyy, axial.y, cyz * axial.z)),
                   half * fma(cxz, axial.x, fma(cyz, axial.y, czz * axial.z))};
-  out.next = turned_on(q, q, w);
+  out.next = turned_on(q, w);
   out.length2 = T(4) * dot(w, w);
   out.ascent = ascent;
   out.half_inverse = {half * cxx, half * cxy, half * cxz, half * cyy, half * cyz, half * czz};
@@ -137,22 +132,19 @@ KERF_HD void horn_matrix(const Mat3<T>& F, T (&N)[4][4]) {
   N[2][3] = N[3][2] = F[1][2] + F[2][1];
 }
 
-/// The axial vector of R^T F, times |q|^2, as the vector part of conj(q) N q: from Horn's matrix,
-/// so without R.
+/// The axial vector of R^T F, times |q|^2, as the vector part of conj(q) N q: without R.
 template <class T>
 KERF_HD Vec3<T> horn_axial(const Mat3<T>& F, const Quat<T>& q) {
-  const T trace = F[0][0] + F[1][1] + F[2][2];
-  const Vec3<T> axial{F[2][1] - F[1][2], F[0][2] - F[2][0], F[1][0] - F[0][1]};
-  const T xx = fma(T(2), F[0][0], -trace), yy = fma(T(2), F[1][1], -trace),
-          zz = fma(T(2), F[2][2], -trace);
-  const T xy = F[0][1] + F[1][0], xz = F[0][2] + F[2][0], yz = F[1][2] + F[2][1];
-  const T w = fma(trace, q.w, fma(axial.x, q.x, fma(axial.y, q.y, axial.z * q.z)));
-  const T x = fma(axial.x, q.w, fma(xx, q.x, fma(xy, q.y, xz * q.z)));
-  const T y = fma(axial.y, q.w, fma(xy, q.x, fma(yy, q.y, yz * q.z)));
-  const T z = fma(axial.z, q.w, fma(xz, q.x, fma(yz, q.y, zz * q.z)));
-  return {fma(q.w, x, fma(-q.x, w, fma(-q.y, z, q.z * y))),
-          fma(q.w, y, fma(-q.y, w, fma(-q.z, x, q.x * z))),
-          fma(q.w, z, fma(-q.z, w, fma(-q.x, y, q.y * x)))};
+  T N[4][4];
+  horn_matrix(F, N);
+  const auto row = [&](int i) {
+    return fma(N[i][0], q.w, fma(N[i][1], q.x, fma(N[i][2], q.y, N[i][3] * q.z)));
+  };
+  const T w = row(0);
+  const Vec3<T> v{row(1), row(2), row(3)};
+  return {fma(q.w, v.x, fma(-q.x, w, fma(-q.y, v.z, q.z * v.y))),
+          fma(q.w, v.y, fma(-q.y, w, fma(-q.z, v.x, q.x * v.z))),
+          fma(q.w, v.z, fma(-q.z, w, fma(-q.x, v.y, q.y * v.x)))};
 }
 
 /// One Jacobi rotation that zeroes N[p][q]; the columns of V collect the eigenvectors.
