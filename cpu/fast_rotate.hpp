@@ -44,21 +44,67 @@ struct NearRotation {
   Singles::Mask done;                   // all but the last step
 };
 
-/// F of kernels/rotation.hpp for a pack of cells, by rows. Not a Mat3: arrays of those are cleared.
-using Gradient = Pack<double>[9];
+/// 4 side F of kernels/rotation.hpp, whose rotation is that of F, by rows, for half of two packs in
+/// single precision. No Mat3: arrays of those are cleared.
+using Gradient = Twin<Pack<double>>[3][3];
 
-inline void gather_gradients(const PatchedLevel& level, std::size_t group, const double* x,
-                             Gradient* out) {
+/// Where the point of a corner lies, of a lane that corners_of or, in rows, heads has at `points`.
+template <RowKind kKind>
+[[gnu::always_inline]] inline const double* corner_at(const double* x, const std::uint16_t* points,
+                                                      int corner, int lane) {
+  const int left = corner & ~1, right = corner & 1;
+  if constexpr (run_of(kKind) > 1) {
+    return at_lane<kRunInPack<kKind, double>>(x, points + 2 * left, lane) + 4 * right;
+  } else if constexpr (kKind == kPairs) {
+    return x + 4 * (std::size_t(points[kGroup * left + lane]) + std::size_t(right));
+  } else {
+    return x + 4 * std::size_t(points[kGroup * corner + lane]);
+  }
+}
+
+/// 4 side (F - I) of a pack, by columns. Three sums of points are brought into lanes, not eight
+/// points.
+template <RowKind kKind>
+[[gnu::always_inline]] inline void gather_columns(const std::uint16_t* points, const double* x,
+                                                  kernels::Vec3<Pack<double>> (&out)[3]) {
   using P = Pack<double>;
-  const P side = P(level.kinds[level.kind[group]].side);
-  for_corners<double>(level, group,
-                      [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
-                        kernels::Vec3<P> corners[8];
-                        gather_corners<row()>(points, x, corners);
-                        const auto F = kernels::mean_gradient(corners, side);
-                        P* const to = out[first / P::kLanes];
-                        kernels::unrolled<9>([&](auto k) { to[k] = F[k / 3][k % 3]; });
-                      });
+  constexpr int kInRegister = P::kLanes / 4;
+  P along_x[4], along_y[4], along_z[4];
+  kernels::unrolled<4>([&](auto k) {
+    P u[8];
+    kernels::unrolled<8>([&](auto corner) {
+      const auto at = [&](int lane) { return corner_at<kKind>(x, points, corner, lane); };
+      if constexpr (run_of(kKind) > 1)
+        u[corner] = load_pack(at(kInRegister * k));
+      else
+        u[corner] = records_of(at, k);
+    });
+    const P up = (u[6] - u[0]) + (u[7] - u[1]), across = (u[2] - u[4]) + (u[3] - u[5]);
+    along_x[k] = ((u[1] - u[0]) + (u[3] - u[2])) + ((u[5] - u[4]) + (u[7] - u[6]));
+    along_y[k] = up + across;
+    along_z[k] = up - across;
+  });
+  by_components(along_x, out[0]);
+  by_components(along_y, out[1]);
+  by_components(along_z, out[2]);
+}
+
+/// Of a group, to the packs from `pack` on.
+inline void gather_gradients(const PatchedLevel& level, std::size_t group, const double* x,
+                             int pack, Gradient* out) {
+  using P = Pack<double>;
+  const P identity(4 * level.kinds[level.kind[group]].side);
+  for_corners<double>(
+      level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
+        kernels::Vec3<P> columns[3];
+        gather_columns<row()>(points, x, columns);
+        const int n = pack + first / P::kLanes;
+        kernels::unrolled<9>([&](auto k) {
+          constexpr int i = k / 3, j = k % 3;
+          Twin<P>& to = out[n / 2][i][j];
+          (n % 2 == 0 ? to.a : to.b) = i == j ? columns[j][i] + identity : columns[j][i];
+        });
+      });
 }
 
 /// A matrix from entry(row, column), in one go: one that is filled later is cleared first.
@@ -135,10 +181,7 @@ inline constexpr float kLastStep = 1e-6F;
   };
   Doubles off[3];
   for (int half = 0; half < 2; ++half) {
-    const Gradient* const of = gradients + 2 * half;
-    const auto F =
-        matrix_of<T>([&](int a, int b) { return T(of[0][3 * a + b], of[1][3 * a + b]); });
-    const kernels::Vec3<T> axial = kernels::horn_axial(F, at(half));
+    const kernels::Vec3<T> axial = kernels::horn_axial<T>(gradients[half], at(half));
     off[0].of[half] = axial.x;
     off[1].of[half] = axial.y;
     off[2].of[half] = axial.z;
@@ -166,7 +209,7 @@ inline constexpr float kLastStep = 1e-6F;
 /// Stores the lanes of two packs that are done. The others, which Newton leads nowhere or not so
 /// soon, go the way of the reference from where they were.
 template <class S>
-[[gnu::noinline, gnu::cold]] void store_some(const Gradient* gradients, const PackMask<float>& done,
+[[gnu::noinline, gnu::cold]] void store_some(const Gradient& gradient, const PackMask<float>& done,
                                              const kernels::Quat<Pack<double>>* q,
                                              std::size_t group, int first_lane,
                                              FinestRotations<S>& rotations) {
@@ -175,8 +218,10 @@ template <class S>
   std::array<std::array<double, 4>, 2 * kLanes> turned;
   for (int k = 0; k < 2 * kLanes; ++k) {
     if (done.v[k] != 0) continue;
-    const auto F = matrix_of<double>(
-        [&](int a, int b) { return gradients[k / kLanes][3 * a + b][k % kLanes]; });
+    const auto F = matrix_of<double>([&](int a, int b) {
+      const auto& entry = gradient[a][b];
+      return k < kLanes ? entry.a[k] : entry.b[k - kLanes];
+    });
     const auto from = rotations.at(first + static_cast<std::size_t>(k));
     const auto best =
         kernels::extract_rotation(F, kernels::Quat<double>{from[0], from[1], from[2], from[3]});
@@ -200,7 +245,7 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
   constexpr int kDoubles = kGroup / Pack<double>::kLanes;  // packs of a group
   constexpr int kSingles = kDoubles / 2;
   static_assert(kSingles * kRotatedGroups == 2 * kTwins);
-  Gradient gradients[4 * kTwins];
+  Gradient gradients[2 * kTwins];
   NearRotation near[kTwins];
   const auto group_of = [&](int n) { return begin + static_cast<std::size_t>(n / kSingles); };
   const auto lane_of = [](int n) { return n % kSingles * Pack<float>::kLanes; };
@@ -208,13 +253,12 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
   for (int g = 0; g < 2 * twins / kSingles; ++g) {  // the last one twice, for a whole twin
     const std::size_t group = begin + static_cast<std::size_t>(std::min(g, count - 1));
     rotations.prefetch_to_store(group);
-    gather_gradients(level, group, x, gradients + kDoubles * g);
+    gather_gradients(level, group, x, kDoubles * g, gradients);
   }
   for (int t = 0; t < twins; ++t) {
-    const Gradient* const of = gradients + 4 * t;
+    const Gradient* const of = gradients + 2 * t;
     const auto F = matrix_of<Singles>([&](int a, int b) {
-      const int k = 3 * a + b;
-      return Singles(joined(of[0][k], of[1][k]), joined(of[2][k], of[3][k]));
+      return Singles(joined(of[0][a][b].a, of[0][a][b].b), joined(of[1][a][b].a, of[1][a][b].b));
     });
     const auto start = [&](int n) {
       return rotations.template load<float>(group_of(n), lane_of(n));
@@ -225,13 +269,13 @@ KERF_FLATTEN void rotate_groups(const PatchedLevel& level, FinestRotations<S>& r
   }
   for (int t = 0; t < twins; ++t) {
     kernels::Quat<Pack<double>> q[4];
-    const Singles::Mask done = take_last_step(gradients + 4 * t, near[t], q);
+    const Singles::Mask done = take_last_step(gradients + 2 * t, near[t], q);
     for (int i = 0; i < 2; ++i) {
       const int n = 2 * t + i;
       if (n == packs) break;
       const PackMask<float>& lanes = i == 0 ? done.a : done.b;
       if (!all(lanes)) {
-        store_some(gradients + 2 * n, lanes, q + 2 * i, group_of(n), lane_of(n), rotations);
+        store_some(gradients[n], lanes, q + 2 * i, group_of(n), lane_of(n), rotations);
         continue;
       }
       rotations.store(group_of(n), lane_of(n), q[2 * i]);

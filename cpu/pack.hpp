@@ -150,6 +150,12 @@ inline void parted(const Pack<float>& pack, Pack<double>& low, Pack<double>& hig
 #endif
 }
 
+/// Where a lane of cells in rows lies: its point, from that of the first cell in its row.
+template <int kRun, class S>
+S* at_lane(S* x, const std::uint16_t* points, int lane) {
+  return x + 4 * (std::size_t(points[lane / kRun * kRun / 4]) + std::size_t(lane % kRun));
+}
+
 /// Asks memory for `count` scalars from x[first] on, which need not be there. What fetches ahead by
 /// itself begins anew with every page, and a pass over a level meets many.
 template <bool to_write = false, class S>
@@ -169,6 +175,11 @@ template <bool to_write = false, class S>
 //   gather_points    one vector of each lane's point
 //   for_records      body(lane, record) for the vectors of the lanes, in the order of the lanes
 //   gather_in_order  the points from one on, one in each lane
+//   records_of       register k of the four with the records of all lanes in their order, in
+//   double:
+//                    at(lane) is where one is. What is summed over points is so before it is
+//                    brought into lanes
+//   by_components    the same brought into lanes
 //   gather_pairs     each lane's point, and the one behind it
 //   add_pairs        adds to these, in the order of the lanes, which may meet in a point
 //   gather_runs<n>   the left and right ends of cells in rows of n: a lane has the points k and

@@ -78,6 +78,14 @@ inline void add_record(double* to, __m256d record) {
   _mm256_store_pd(to, _mm256_add_pd(_mm256_load_pd(to), record));
 }
 
+template <class At>
+Pack<double> records_of(const At& at, int k) {
+  return Pack<double>::Vector(_mm256_load_pd(at(k)));
+}
+inline void by_components(const Pack<double> (&r)[4], kernels::Vec3<Pack<double>>& out) {
+  transpose(__m256d(r[0].v), __m256d(r[1].v), __m256d(r[2].v), __m256d(r[3].v), out);
+}
+
 inline void gather_points(const float* x, const std::uint16_t* at,
                           kernels::Vec3<Pack<float>>& out) {
   const auto pair = [&](int k) {

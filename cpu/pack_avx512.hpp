@@ -129,6 +129,15 @@ inline void add_to(double* to, __m256d one) {
   _mm256_store_pd(to, _mm256_add_pd(_mm256_load_pd(to), one));
 }
 
+template <class At>
+Pack<double> records_of(const At& at, int k) {
+  const __m512d first = _mm512_castpd256_pd512(_mm256_load_pd(at(2 * k)));
+  return Pack<double>::Vector(_mm512_insertf64x4(first, _mm256_load_pd(at(2 * k + 1)), 1));
+}
+inline void by_components(const Pack<double> (&r)[4], kernels::Vec3<Pack<double>>& out) {
+  transpose(__m512d(r[0].v), __m512d(r[1].v), __m512d(r[2].v), __m512d(r[3].v), out);
+}
+
 inline void gather_points(const float* x, const std::uint16_t* at,
                           kernels::Vec3<Pack<float>>& out) {
   const auto one = [&](int k) { return _mm_load_ps(x + 4 * std::size_t(at[k])); };
@@ -180,12 +189,6 @@ template <class Body>
     body(2 * i, R(_mm512_castpd512_pd256(r[i])));
     body(2 * i + 1, R(_mm512_extractf64x4_pd(r[i], 1)));
   }
-}
-
-/// Where a lane of cells in rows lies: its point, from that of the first cell in its row.
-template <int kRun, class S>
-S* at_lane(S* x, const std::uint16_t* points, int lane) {
-  return x + 4 * (std::size_t(points[lane / kRun * kRun / 4]) + std::size_t(lane % kRun));
 }
 
 template <int kRun>

@@ -34,6 +34,15 @@ Pack<S> sqrt(const Pack<S>& a) {
   return out;
 }
 
+template <class At>
+Pack<double> records_of(const At& at, int k) {
+  return load_pack(at(k));
+}
+inline void by_components(const Pack<double> (&r)[4], kernels::Vec3<Pack<double>>& out) {
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 3; ++c) out[c].set(i, r[i][c]);
+}
+
 template <class S>
 void gather_points(const S* x, const std::uint16_t* at, kernels::Vec3<Pack<S>>& out) {
   for (int i = 0; i < Pack<S>::kLanes; ++i)
@@ -56,7 +65,7 @@ template <int kRun, class S>
 void gather_runs(const S* x, const std::uint16_t* points, kernels::Vec3<Pack<S>>& left,
                  kernels::Vec3<Pack<S>>& right) {
   for (int i = 0; i < Pack<S>::kLanes; ++i) {
-    const S* const at = x + 4 * (std::size_t(points[(i - i % kRun) / 4]) + std::size_t(i % kRun));
+    const S* const at = at_lane<kRun>(x, points, i);
     for (int c = 0; c < 3; ++c) {
       left[c].set(i, at[c]);
       right[c].set(i, at[4 + c]);

@@ -118,8 +118,9 @@ KERF_HD Quat<T> rotation_newton(const Mat3<T>& F, Quat<T> start, int iterations)
 }
 
 /// Horn's matrix N with tr(R(q)^T F) = q^T N q for a unit quaternion q = (w, x, y, z).
-template <class T>
-KERF_HD void horn_matrix(const Mat3<T>& F, T (&N)[4][4]) {
+/// `F`: rows of columns.
+template <class T, class Matrix>
+KERF_HD void horn_matrix(const Matrix& F, T (&N)[4][4]) {
   N[0][0] = F[0][0] + F[1][1] + F[2][2];
   N[1][1] = F[0][0] - F[1][1] - F[2][2];
   N[2][2] = F[1][1] - F[0][0] - F[2][2];
@@ -133,8 +134,8 @@ KERF_HD void horn_matrix(const Mat3<T>& F, T (&N)[4][4]) {
 }
 
 /// The axial vector of R^T F, times |q|^2, as the vector part of conj(q) N q: without R.
-template <class T>
-KERF_HD Vec3<T> horn_axial(const Mat3<T>& F, const Quat<T>& q) {
+template <class T, class Matrix>
+KERF_HD Vec3<T> horn_axial(const Matrix& F, const Quat<T>& q) {
   T N[4][4];
   horn_matrix(F, N);
   const auto row = [&](int i) {

@@ -99,6 +99,25 @@ TYPED_TEST(PointsOfPacks, ThatSeveralLanesMeetGetTheSumOfAll) {
     }
 }
 
+TEST(RecordsOfPacks, AreThoseOfTheLanesInTheirOrder) {
+  constexpr int kLanes = Pack<double>::kLanes;
+  const Records<double> x(3);
+  const auto point = [](int lane) { return (7 * lane + 3) % 61; };
+  Pack<double> records[4];
+  for (int k = 0; k < 4; ++k)
+    records[k] = cpu::records_of([&](int lane) { return x.s + 4 * point(lane); }, k);
+
+  Vec3<Pack<double>> v;
+  cpu::by_components(records, v);
+
+  for (int lane = 0; lane < kLanes; ++lane)
+    for (int c = 0; c < 3; ++c) {
+      const int at = 4 * lane + c;
+      EXPECT_EQ(records[at / kLanes][at % kLanes], x.at(point(lane), c));
+      EXPECT_EQ(v[c][lane], x.at(point(lane), c));
+    }
+}
+
 /// Cells whose left ends along x are at some points and whose right ends are at those behind these:
 /// gather(x, left, right) and add(y, f, g) are to read and to add to them.
 template <class S, class Gather, class Add>

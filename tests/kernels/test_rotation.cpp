@@ -140,7 +140,7 @@ TEST(HornAxial, IsTheAxialVectorOfTheTurnedGradient) {
     const double length = random.uniform(0.5, 2);
     const auto scaled = to_quat<double>(q);
     const Matrix3 A = length * length * q.toRotationMatrix().transpose() * F;
-    const auto axial = kernels::horn_axial(
+    const auto axial = kernels::horn_axial<double>(
         to_mat3<double>(F),
         {length * scaled.w, length * scaled.x, length * scaled.y, length * scaled.z});
     const Vector3 expected(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
