@@ -13,6 +13,16 @@
 
 namespace kerf {
 
+namespace {
+
+/// What was said is all that these commands leave.
+void expect_said() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Error(ErrorKind::bad_input, "standard output: cannot be written");
+}
+
+}  // namespace
+
 int check_command(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   const Scene scene = read_scene(file, overrides);
   const Simulation simulation = open_simulation(scene, open_backend(scene));
@@ -31,6 +41,7 @@ int check_command(const std::filesystem::path& file, const std::vector<std::stri
              static_cast<double>(simulation.bytes()) / static_cast<double>(simulation.cells()));
   fmt::print("run       {} steps, {} {}\n", simulation.steps_planned(), scene.setup.cuts.size(),
              scene.setup.cuts.size() == 1 ? "cut" : "cuts");
+  expect_said();
   return kDone;
 }
 
@@ -41,6 +52,7 @@ int info_command() {
   fmt::print("preview   {}\n",
              kHasPreview ? "ready" : "not built; configure with -DKERF_PREVIEW=ON");
   fmt::print("libraries {}\n", kLibraries);
+  expect_said();
   return kDone;
 }
 

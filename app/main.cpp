@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <cstdio>
 
+#include "app/bounded_wait.hpp"
 #include "app/commands.hpp"
 #include "app/version.hpp"
 #include "core/base/memory.hpp"
@@ -41,6 +43,7 @@ CLI::App* add_render(CLI::App& app, kerf::RenderOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  kerf::bound_waiting(argv);
   kerf::return_large_blocks_when_freed();
   CLI::App app{"Kerf simulates cuts in deformable bodies."};
   app.name("kerf");
@@ -81,7 +84,9 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // CLI11 has statuses of its own; help and version are 0, everything else is bad input.
-    return app.exit(error) == 0 ? kerf::kDone : kerf::kBadInput;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    std::fprintf(stderr, "kerf: error: %s\nRun with --help for more information.\n", error.what());
+    return kerf::kBadInput;
   }
   return kerf::guarded([&] {
     if (run->parsed()) return kerf::run_command(options);

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "app/commands.hpp"
+#include "app/folder_lock.hpp"
 #include "app/interrupt.hpp"
 #include "app/preview.hpp"
 #include "app/progress.hpp"
@@ -149,16 +150,18 @@ class Render {
     Framing framing = start_framing(last, mesh);
     about(last.surface, [&] { framing.add(mesh); });
     make_folder(out_);
+    const FolderLock lock(out_);
     draw("preview.png", mesh, framing);
     say(fmt::format("picture    {}", (out_ / "preview.png").string()));
     return kDone;
   }
 
   int all_frames() {
-    const InterruptGuard guard;
+    const InterruptGuard guard("interrupted: this picture is finished; again, to quit without");
     bar_.start_frames(static_cast<int>(series_.size()));
     const Framing framing = frame_all();
     make_folder(out_);
+    const FolderLock lock(out_);
     std::size_t drawn = 0;
     for (; drawn < series_.size() && !InterruptGuard::asked(); ++drawn) {
       bar_.phase("drawing", 0, 0);
@@ -277,6 +280,7 @@ class Render {
 
 int render_command(const RenderOptions& options) {
   require_preview();
+  let_writes_fail();
   const PreviewOptions picture = picture_options(options);
   Render render(options, picture);
   return options.frames ? render.all_frames() : render.last_picture();

@@ -163,6 +163,7 @@ ResultsFolder::ResultsFolder(fs::path folder, OutputSettings settings)
     for (const auto& p : created_) fs::remove(p, error);
     throw cannot_write(folder_, why);
   }
+  lock_.emplace(folder_);
   const fs::path probe = folder_ / partial_name(kSummary);
   std::ofstream out(probe);
   const int reason = errno;
@@ -271,7 +272,13 @@ void ResultsFolder::commit(const Summary& summary) {
     if (fs::exists(status) && !fs::is_regular_file(status))
       throw cannot_write(folder_ / name, "something that is no file has this name; move it away");
   };
-  for (const auto& name : files_) expect_free(name);
+  for (const auto& name : files_) {
+    expect_free(name);
+    if (!fs::exists(folder_ / partial_name(name), error))
+      throw cannot_write(folder_ / name,
+                         "its temporary file is gone: something else emptied the "
+                         "folder while the run wrote to it");
+  }
   expect_free(kSummary);
   const bool earlier_run = fs::exists(folder_ / kSummary, error);
   // The old summary goes first and the new one comes last: a summary means that all is there.

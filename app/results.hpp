@@ -5,11 +5,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "app/folder_lock.hpp"
 #include "app/scene.hpp"
 #include "core/simulation.hpp"
 
@@ -47,8 +49,8 @@ void write_vtu(const std::filesystem::path& file, const Snapshot& snapshot);
 /// left are replaced or removed then; others are not touched.
 class ResultsFolder {
  public:
-  /// Creates the folder if it is absent.
-  /// @throws Error (bad_input) if it is a file or cannot be written.
+  /// Creates the folder if it is absent, and locks it.
+  /// @throws Error (bad_input) if it is a file, cannot be written, or another run writes into it.
   ResultsFolder(std::filesystem::path folder, OutputSettings settings);
   ~ResultsFolder();
   ResultsFolder(const ResultsFolder&) = delete;
@@ -77,6 +79,7 @@ class ResultsFolder {
 
   std::filesystem::path folder_;
   OutputSettings settings_;
+  std::optional<FolderLock> lock_;
   bool committed_ = false;
   std::vector<std::filesystem::path> created_;  // folders that were not there before
   std::vector<std::string> files_;              // names, written as partial so far

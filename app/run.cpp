@@ -32,6 +32,25 @@ Vec3d up_direction(const SimulationSetup& setup) {
   return {0, 1, 0};
 }
 
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Adds the seconds that it lives.
+class AddSeconds {
+ public:
+  explicit AddSeconds(double& sum) : sum_(sum) {}
+  ~AddSeconds() { sum_ += seconds_since(begin_); }
+  AddSeconds(const AddSeconds&) = delete;
+  AddSeconds& operator=(const AddSeconds&) = delete;
+
+ private:
+  double& sum_;
+  Clock::time_point begin_ = Clock::now();
+};
+
 /// One run, from its first step to its files.
 class Run {
  public:
@@ -44,8 +63,9 @@ class Run {
         hits_(scene.setup.cuts.size(), 0) {}
 
   int execute() {
-    begin_ = std::chrono::steady_clock::now();
-    const InterruptGuard guard;
+    begin_ = Clock::now();
+    const InterruptGuard guard(
+        "interrupted: this step is finished and what there is written; again, to quit without");
     say_body();
     say_warnings();
     write_state();
@@ -123,6 +143,7 @@ class Run {
   }
 
   void write_state() {
+    const AddSeconds timer(files_);
     const int step = simulation_steps();
     const double time = simulation_.time();
     if (scene_.output.vtu) results_.add_snapshot(step, time, simulation_.snapshot());
@@ -144,9 +165,15 @@ class Run {
 
   void draw() {
     if (!scene_.output.preview) return;
+    const AddSeconds timer(picture_);
     if (scene_.setup.surface == SurfaceMethod::none) {
       if (scene_.places.contains("output.preview"))
         warn("no preview.png: output.surface is \"none\"");
+      return;
+    }
+    if (summary_.interrupted) {  // who interrupts does not want to wait
+      warn(text("no preview.png: interrupted; kerf render ", results_.folder().string(),
+                " draws it"));
       return;
     }
     try {
@@ -178,8 +205,9 @@ class Run {
       summary_.level_vertices.push_back(static_cast<std::size_t>(level.vertices()));
     }
     summary_.seconds = s.seconds();
-    summary_.seconds_total =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    summary_.seconds.emplace_back("files", files_);
+    summary_.seconds.emplace_back("picture", picture_);
+    summary_.seconds_total = seconds_since(begin_);
     summary_.peak_bytes = peak_bytes();
     summary_.bytes = s.bytes();
     summary_.backend = s.backend().name();
@@ -231,7 +259,8 @@ class Run {
   Summary summary_;
   SurfaceMesh surface_;            // of step last_written_; empty if the scene asks for none
   std::vector<std::size_t> hits_;  // links met, per cut
-  std::chrono::steady_clock::time_point begin_{};
+  Clock::time_point begin_{};
+  double files_ = 0, picture_ = 0;  // seconds
   std::string missed_;
   std::size_t warnings_said_ = 0;
   StepReport first_not_converged_;
@@ -242,6 +271,7 @@ class Run {
 }  // namespace
 
 int run_command(const RunOptions& options) {
+  let_writes_fail();
   const Scene scene = read_scene(options.scene, options.overrides);
   auto backend = open_backend(scene);
   ResultsFolder results(options.out, scene.output);

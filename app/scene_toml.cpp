@@ -120,6 +120,9 @@ SceneSource::SceneSource(const std::string& toml, std::filesystem::path file,
   try {
     root_ = toml::parse(toml, file_.string());
   } catch (const toml::parse_error& error) {
+    for (const char* mesh : {".obj", ".ply", ".off", ".stl"})
+      expects(file_.extension() != mesh,
+              text(file_.string(), ": is a mesh, not a scene; name it as body.mesh of a scene"));
     throw Error(ErrorKind::bad_input,
                 text(file_.string(), ":", error.source().begin.line, ": ", error.description()));
   }

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <set>
 
+#include "app/bounded_wait.hpp"
 #include "app/commands.hpp"
 #include "bench/command_line.hpp"
 #include "bench/compare.hpp"
@@ -101,6 +102,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  bound_waiting(argv);
   return run_program("kerf_bench", "choose a smaller scene or fewer threads at once",
                      [&] { return run(argc, argv); });
 }

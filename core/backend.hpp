@@ -72,11 +72,13 @@ struct CycleOptions;  // core/solve/cycle.hpp
 /// Holds one simulation's matrices and vectors and runs the loops over them.
 /// Not thread-safe. A call may return early; the next call on the same object sees its result.
 /// Fixed components take no part: operators read them as zero and leave zero in them.
+/// Needs load() before all else but set_smoother and add_vector, and levels and vectors that are
+/// there; numbers of them are not checked.
 /// @throws Error from any call if memory or the device fails; the object is then unusable.
 class Backend {
  public:
   virtual ~Backend() = default;
-  virtual const char* name() const noexcept = 0;  ///< "cpu" or "cuda"
+  virtual const char* name() const noexcept = 0;  ///< "cpu", "reference", "cuda"
   /// Of the processor, that the loops are compiled for: "baseline", "avx2", ...; empty: on a
   /// device.
   virtual const char* instruction_set() const noexcept { return ""; }

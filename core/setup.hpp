@@ -109,6 +109,7 @@ struct SolverSetup {
   int coarsest_vertices = 1500;  ///< direct solve at the first level with at most so many
   int max_levels = 0;            ///< 0: no limit
   bool duplicate_cells = true;   ///< false: merge by place only (for comparison)
+  // For whoever makes the backend, as the command does: Simulation takes the one that it is given.
   Precision precision = Precision::double_;
   std::string backend = "cpu";  ///< cpu, reference, cuda, auto
   int threads = 0;              ///< 0: all

@@ -381,6 +381,7 @@ void Simulation::Impl::warn_of_pieces() {
     for (const std::int32_t v : level.slots[c])
       if (level.fixed[v] != 0) is_held[piece[c]] = 1;
   const auto loose = std::count(is_held.begin(), is_held.end(), 0);
+  if (loose == 0) return;
   warnings.push_back(text("the body starts as ", pieces, " pieces, ", loose,
                           " of them held by no support; a finer body.resolution joins thin parts"));
 }
@@ -421,7 +422,7 @@ StepReport Simulation::Impl::step() {
 }
 
 Simulation::Simulation(SimulationSetup setup, std::unique_ptr<Backend> backend) {
-  expects(backend != nullptr, "Simulation needs a backend; see make_cpu_backend");
+  expects(backend != nullptr, "Simulation needs a backend; see make_fast_backend");
   validate(setup);
   impl_ = std::make_unique<Impl>(std::move(setup), std::move(backend));
   impl_->start();

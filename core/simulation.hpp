@@ -5,7 +5,7 @@
 //   kerf::SimulationSetup setup;
 //   setup.body = {kerf::make_box({{0, 0, 0}, {0.1, 0.1, 0.1}}), 32, 1};
 //   ...
-//   kerf::Simulation simulation(setup, kerf::make_cpu_backend({}));
+//   kerf::Simulation simulation(setup, kerf::make_fast_backend());
 //   while (!simulation.finished()) simulation.step();
 #pragma once
 
@@ -70,15 +70,16 @@ struct Snapshot {
 
 class Simulation {
  public:
-  /// Called between parts of a long step: phase name, cycles so far, current residual. Nothing of
-  /// the simulation may be read then.
+  /// Called after each cycle of a time step ("solve") and each update of an equilibrium
+  /// ("equilibrium"): phase name, cycles or updates so far, residual. Nothing of the simulation may
+  /// be read then, nor step() called.
   using Progress = std::function<void(const char* phase, int cycles, double residual)>;
 
   /// @throws Error (bad_input) for a setup that makes no sense; Error (unavailable) when memory
   /// would not suffice, before it is allocated.
   Simulation(SimulationSetup setup, std::unique_ptr<Backend> backend);
   ~Simulation();
-  Simulation(Simulation&&) noexcept;
+  Simulation(Simulation&&) noexcept;  ///< what was moved from may only be assigned or destroyed
   Simulation& operator=(Simulation&&) noexcept;
 
   /// Whether the duration is over (dynamic), or all cuts are made and solved (static).

@@ -51,6 +51,30 @@ class ResultsTest : public test::FolderTest {
   void touch(const fs::path& file) { test::write_all(file, "x"); }
 };
 
+TEST_F(ResultsTest, OneAtATimeWritesIntoAFolder) {
+  {
+    const FolderLock lock(root_);
+    EXPECT_THROW(FolderLock{root_}, Error);
+    EXPECT_THROW(ResultsFolder(root_, {}), Error);
+  }
+  EXPECT_NO_THROW(FolderLock{root_});
+  EXPECT_EQ(names(root_), std::vector<std::string>{});
+}
+
+// Of a run whose temporary files somebody removed, nothing counts.
+TEST_F(ResultsTest, AnEarlierRunStaysWhereAFileIsGone) {
+  touch(root_ / "summary.json");
+  touch(root_ / "body_0000.vtu");
+  {
+    ResultsFolder results(root_, {});
+    touch(results.add_file("body_0000.vtu"));
+    fs::remove(results.add_file("preview.png"));
+    EXPECT_THROW(results.commit({}), Error);
+  }
+  EXPECT_EQ(names(root_), (std::vector<std::string>{"body_0000.vtu", "summary.json"}));
+  EXPECT_EQ(read_all(root_ / "summary.json"), "x");
+}
+
 TEST_F(ResultsTest, VtuHoldsWhatAnOutsiderNeedsToTheLastBit) {
   const Snapshot s = two_cut_cells();
   write_vtu(root_ / "a.vtu", s);
@@ -115,9 +139,9 @@ TEST_F(ResultsTest, SummaryHasTheAgreedKeys) {
   const auto json = nlohmann::json::parse(to_json(summary));
 
   for (const char* key :
-       {"scene",     "cells",   "cells_before_cuts", "vertices", "unknowns",   "hanging",
-        "levels",    "pieces",  "seconds",           "steps",    "peak_bytes", "bytes_per_cell",
-        "backend",   "threads", "precision",         "version",  "commit",     "state_hash",
+       {"scene",     "cells",    "cells_before_cuts", "vertices", "unknowns",   "hanging",
+        "levels",    "pieces",   "seconds",           "steps",    "peak_bytes", "bytes_per_cell",
+        "backend",   "threads",  "precision",         "version",  "commit",     "state_hash",
         "links_cut", "warnings", "instruction_set"})
     EXPECT_TRUE(json.contains(key)) << key;
   EXPECT_EQ(json["state_hash"], "0000000000000abc");
