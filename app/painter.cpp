@@ -7,6 +7,8 @@
 #include <cmath>
 #include <thread>
 
+#include "core/base/error.hpp"
+
 namespace kerf {
 namespace {
 
@@ -62,14 +64,17 @@ class Painter {
   void each_pixel(const Work& work) const {
     std::atomic<int> next{0};
     const auto rows = [&] {
-      for (int y = next++; y < canvas_.height; y = next++)
+      for (int y = next++; y < canvas_.height && !gives_up(); y = next++)
         for (int x = 0; x < canvas_.width; ++x) work(x, y);
     };
     const unsigned all = std::max(1u, std::thread::hardware_concurrency());
     std::vector<std::jthread> threads(canvas_.threads > 0 ? static_cast<unsigned>(canvas_.threads)
                                                           : all);
     for (auto& thread : threads) thread = std::jthread(rows);
+    threads.clear();  // which waits for them
+    if (gives_up()) throw Error(ErrorKind::unavailable, "interrupted");
   }
+  bool gives_up() const { return canvas_.stop != nullptr && canvas_.stop(); }
 
   /// Gives `use` n x n samples of one pixel, each from its own part of it.
   template <class Use>

@@ -61,7 +61,8 @@ std::vector<std::uint8_t> draw_pixels(const SurfaceMesh& mesh, const Framing& fr
                                       const PreviewOptions& options) {
   const RayScene scene(mesh, framing);
   const Studio studio(scene, framing);
-  return paint(studio, {options.width, options.height, options.samples, options.threads});
+  return paint(studio,
+               {options.width, options.height, options.samples, options.threads, options.stop});
 }
 
 void draw_preview(const std::filesystem::path& file, const SurfaceMesh& mesh,

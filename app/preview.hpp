@@ -16,8 +16,9 @@ namespace kerf {
 struct PreviewOptions {
   Vec3d up{0, 1, 0};  ///< points up in the picture; need not be of unit length
   int width = 1200, height = 900;
-  int samples = 4;  ///< per pixel and direction at edges; elsewhere few suffice
-  int threads = 0;  ///< 0: as many as the machine has
+  int samples = 4;           ///< per pixel and direction at edges; elsewhere few suffice
+  int threads = 0;           ///< 0: as many as the machine has
+  bool (*stop)() = nullptr;  ///< whether to give up, asked now and then: Error (unavailable)
   std::optional<View> view = std::nullopt;  ///< none: where most of the cut faces are seen
 
   double aspect() const { return static_cast<double>(width) / height; }

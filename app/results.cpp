@@ -176,14 +176,21 @@ ResultsFolder::ResultsFolder(fs::path folder, OutputSettings settings)
 }
 
 ResultsFolder::~ResultsFolder() {
-  if (committed_) return;
+  if (committed_ || !lock_->is_in_place()) return;
   std::error_code error;
   for (const auto& name : files_) fs::remove(folder_ / partial_name(name), error);
   fs::remove(folder_ / partial_name(kSummary), error);
   for (const auto& p : created_) fs::remove(p, error);  // fails, as it should, if not empty
 }
 
+// Else another run may be at work under the same name.
+void ResultsFolder::expect_in_place() const {
+  if (!lock_->is_in_place())
+    throw cannot_write(folder_, "the folder that this run began in was moved or removed");
+}
+
 fs::path ResultsFolder::add_file(const std::string& name) {
+  expect_in_place();
   files_.push_back(name);
   return folder_ / partial_name(name);
 }
@@ -261,6 +268,7 @@ void ResultsFolder::remove_stale(bool earlier_run) const {
 }
 
 void ResultsFolder::commit(const Summary& summary) {
+  expect_in_place();
   if (settings_.pvd && settings_.vtu) write_series("body.pvd", bodies_);
   if (settings_.pvd && settings_.vtp) write_series("surface.pvd", surfaces_);
   write_text(kSummary, to_json(summary));

@@ -73,6 +73,7 @@ class ResultsFolder {
   /// Times and the files that show them.
   using Series = std::vector<std::pair<double, std::string>>;
 
+  void expect_in_place() const;
   void write_text(const std::string& name, const std::string& content);
   void write_series(const std::string& name, const Series& series);
   void remove_stale(bool earlier_run) const;

@@ -3,7 +3,6 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 
@@ -15,6 +14,7 @@
 #include "app/results.hpp"
 #include "app/session.hpp"
 #include "core/base/error.hpp"
+#include "core/base/timer.hpp"
 
 namespace kerf {
 namespace {
@@ -32,25 +32,6 @@ Vec3d up_direction(const SimulationSetup& setup) {
   return {0, 1, 0};
 }
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-/// Adds the seconds that it lives.
-class AddSeconds {
- public:
-  explicit AddSeconds(double& sum) : sum_(sum) {}
-  ~AddSeconds() { sum_ += seconds_since(begin_); }
-  AddSeconds(const AddSeconds&) = delete;
-  AddSeconds& operator=(const AddSeconds&) = delete;
-
- private:
-  double& sum_;
-  Clock::time_point begin_ = Clock::now();
-};
-
 /// One run, from its first step to its files.
 class Run {
  public:
@@ -63,9 +44,8 @@ class Run {
         hits_(scene.setup.cuts.size(), 0) {}
 
   int execute() {
-    begin_ = Clock::now();
     const InterruptGuard guard(
-        "interrupted: this step is finished and what there is written; again, to quit without");
+        "interrupted: what there is will be written; once more, to quit without it");
     say_body();
     say_warnings();
     write_state();
@@ -73,6 +53,7 @@ class Run {
     if (last_written_ != simulation_steps()) write_state();
     draw();
     finish_summary();
+    guard.hold_on();
     results_.commit(summary_);
     say_end();
     return status();
@@ -143,7 +124,7 @@ class Run {
   }
 
   void write_state() {
-    const AddSeconds timer(files_);
+    const AddTime timer(files_);
     const int step = simulation_steps();
     const double time = simulation_.time();
     if (scene_.output.vtu) results_.add_snapshot(step, time, simulation_.snapshot());
@@ -165,20 +146,18 @@ class Run {
 
   void draw() {
     if (!scene_.output.preview) return;
-    const AddSeconds timer(picture_);
+    const AddTime timer(picture_);
     if (scene_.setup.surface == SurfaceMethod::none) {
       if (scene_.places.contains("output.preview"))
         warn("no preview.png: output.surface is \"none\"");
       return;
     }
-    if (summary_.interrupted) {  // who interrupts does not want to wait
-      warn(text("no preview.png: interrupted; kerf render ", results_.folder().string(),
-                " draws it"));
-      return;
-    }
+    if (InterruptGuard::asked()) return warn("no preview.png: interrupted");
     try {
       draw_preview(results_.add_file("preview.png"), surface_,
-                   {.up = up_direction(scene_.setup), .threads = simulation_.backend().threads()});
+                   {.up = up_direction(scene_.setup),
+                    .threads = simulation_.backend().threads(),
+                    .stop = InterruptGuard::asked});  // who interrupts does not want to wait
       drawn_ = true;
     } catch (const std::exception& error) {  // a run is worth keeping without its picture
       results_.drop_file("preview.png");
@@ -207,7 +186,7 @@ class Run {
     summary_.seconds = s.seconds();
     summary_.seconds.emplace_back("files", files_);
     summary_.seconds.emplace_back("picture", picture_);
-    summary_.seconds_total = seconds_since(begin_);
+    summary_.seconds_total = timer_.seconds();
     summary_.peak_bytes = peak_bytes();
     summary_.bytes = s.bytes();
     summary_.backend = s.backend().name();
@@ -259,7 +238,7 @@ class Run {
   Summary summary_;
   SurfaceMesh surface_;            // of step last_written_; empty if the scene asks for none
   std::vector<std::size_t> hits_;  // links met, per cut
-  Clock::time_point begin_{};
+  Timer timer_;
   double files_ = 0, picture_ = 0;  // seconds
   std::string missed_;
   std::size_t warnings_said_ = 0;

@@ -44,8 +44,8 @@ struct NearRotation {
   Singles::Mask done;                   // all but the last step
 };
 
-/// 4 side F of kernels/rotation.hpp, whose rotation is that of F, by rows, for half of two packs in
-/// single precision. No Mat3: arrays of those are cleared.
+/// 4 side F of kernels/rotation.hpp, m, by rows: it has the rotation of F. Of two packs in double,
+/// which make one in single precision. No Mat3: arrays of those are cleared.
 using Gradient = Twin<Pack<double>>[3][3];
 
 /// Where the point of a corner lies, of a lane that corners_of or, in rows, heads has at `points`.
@@ -134,7 +134,7 @@ inline constexpr float kLastStep = 1e-6F;
   using T = Singles;
   constexpr int kIterations = 8;
   const T near2 = T(kNearStep * kNearStep), stale2 = T(kStale * kStale);
-  const T least = T(1e-9F);  // whose cube keeps its digits
+  const T least = T(1e-9F);  // m; its cube keeps its digits
   kernels::Quat<T>& q = near.q;
   near.done = T(1) < T(0);  // such lanes stay, so that no lane depends on others
   const auto take_step = [&](auto is_first) {

@@ -175,11 +175,9 @@ template <bool to_write = false, class S>
 //   gather_points    one vector of each lane's point
 //   for_records      body(lane, record) for the vectors of the lanes, in the order of the lanes
 //   gather_in_order  the points from one on, one in each lane
-//   records_of       register k of the four with the records of all lanes in their order, in
-//   double:
-//                    at(lane) is where one is. What is summed over points is so before it is
-//                    brought into lanes
-//   by_components    the same brought into lanes
+//   records_of       in double, register k of four that hold the records of all lanes in their
+//                    order: at(lane) is where one lies. Sums over points cost less so
+//   by_components    brings four such registers into lanes
 //   gather_pairs     each lane's point, and the one behind it
 //   add_pairs        adds to these, in the order of the lanes, which may meet in a point
 //   gather_runs<n>   the left and right ends of cells in rows of n: a lane has the points k and

@@ -118,7 +118,7 @@ KERF_HD Quat<T> rotation_newton(const Mat3<T>& F, Quat<T> start, int iterations)
 }
 
 /// Horn's matrix N with tr(R(q)^T F) = q^T N q for a unit quaternion q = (w, x, y, z).
-/// `F`: rows of columns.
+/// `F`: whatever has entries F[row][column].
 template <class T, class Matrix>
 KERF_HD void horn_matrix(const Matrix& F, T (&N)[4][4]) {
   N[0][0] = F[0][0] + F[1][1] + F[2][2];

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -294,6 +295,16 @@ TEST_F(PictureTest, FileIsAPngOfTheSizeAskedFor) {
   EXPECT_THROW(draw_preview("/proc/kerf.png", sphere_with_two_cuts(), options_), Error);
   EXPECT_THROW(draw_preview(file, {}, options_), Error);
   EXPECT_FALSE(fs::exists(file));
+}
+
+TEST_F(PictureTest, IsGivenUpWhenItIsToStop) {
+  static std::atomic<int> asked;
+  asked = 0;
+  options_.stop = [] { return ++asked > 20; };  // in the middle of its rows
+  EXPECT_THROW(
+      draw_pixels(sphere_with_two_cuts(), frame(sphere_with_two_cuts(), {10, 15}), options_),
+      Error);
+  EXPECT_LT(asked, options_.height);
 }
 
 }  // namespace

@@ -18,6 +18,29 @@ namespace kerf::test {
 
 namespace fs = std::filesystem;
 
+/// A block of 6 x 3 x 3 cells that stands on its low end and takes three steps.
+inline const std::string kBlock = R"(
+title = "block"
+[body]
+shape = "box"
+size = [0.06, 0.03, 0.03]
+resolution = 6
+[material]
+young = 1e5
+damping = [0, 0.01]
+[[support]]
+box = [[-1, -1, -1], [0.001, 1, 1]]
+[[load]]
+gravity = [0, -9.81, 0]
+[time]
+step = 0.01
+duration = 0.03
+[solver]
+threads = 1
+[output]
+preview = false
+)";
+
 struct Outcome {
   int status;
   std::string out, err;
