@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Cells that are one element each: those of level 0, and those of the levels above it of which
-// rotations alone are stored (cpu/stored_matrices.hpp). Loading of lanes, no loops over groups and
+// Cells that have a rotation: those of level 0, which are one element each, and some of the levels
+// above it (cpu/stored_matrices.hpp), of which some are. Loading of lanes, no loops over groups and
 // no threads.
 #pragma once
 
@@ -22,6 +22,7 @@ template <class S>
 struct FinestCells {
   const PatchedLevel& level;
   const FinestRotations<S>& rotations;
+  bool unrotated = false;  ///< as if none had turned
 
   const CellKind& kind(std::uint16_t number) const { return level.kinds[number]; }
   /// w; the others follow in steps of a group.
@@ -31,9 +32,10 @@ struct FinestCells {
     return rotations.template component<T>(lane, c);
   }
   template <int kLanes = kGroup>
-  static bool are_all(const std::int32_t*) {
+  static bool are_elements(const std::int32_t*) {
     return true;
   }
+  static bool is_turned(std::int32_t) { return true; }
 };
 
 /// What a cell of a level above level 0 is as one element.
@@ -46,10 +48,13 @@ inline CellKind element_kind(const std::vector<CellKind>& finest, std::uint16_t 
   return out;
 }
 
+/// Cells of a level above level 0: elements, or others that are turned, whose rotations alone are
+/// asked for.
 template <class S>
-struct TurnedCells {
+struct StoredCells {
   const PatchedLevel &finest, &level;
   const StoredMatrices<S>& matrices;
+  bool unrotated = false;  ///< as if none had turned
 
   CellKind kind(std::uint16_t number) const { return element_kind(finest.kinds, number); }
   const S* rotation(std::size_t lane) const { return matrices.rotation_of(lane); }
@@ -57,15 +62,18 @@ struct TurnedCells {
   T component(std::size_t lane, std::size_t c) const {
     return rotation(lane)[kGroup * c];
   }
-  /// Whether all children are such, of so many parents. `lanes`: [octant][kGroup], -1: none.
+  /// Whether all children are elements, of so many parents. `lanes`: [octant][kGroup], -1: none.
   template <int kLanes = kGroup>
-  bool are_all(const std::int32_t* lanes) const {
+  bool are_elements(const std::int32_t* lanes) const {
     for (int octant = 0; octant < 8; ++octant)
       for (int k = 0; k < kLanes; ++k)
         if (const std::int32_t lane = lanes[kGroup * octant + k];
-            lane >= 0 && !matrices.is_turned(static_cast<std::size_t>(lane / kGroup)))
+            lane >= 0 && !matrices.is_element(static_cast<std::size_t>(lane / kGroup)))
           return false;
     return true;
+  }
+  bool is_turned(std::int32_t lane) const {
+    return matrices.is_turned(static_cast<std::size_t>(lane / kGroup));
   }
 };
 
@@ -76,6 +84,10 @@ constexpr std::size_t kMostNumbered = std::size_t{1} << 31;  // by 32 bits
 template <class Cells, class S>
 void load_rotations(const Cells& cells, const std::int32_t* lanes, kernels::Quat<Pack<S>>& out) {
   constexpr int kLanes = Pack<S>::kLanes;
+  if (cells.unrotated) {
+    out = {Pack<S>(1), Pack<S>(0), Pack<S>(0), Pack<S>(0)};
+    return;
+  }
 #if KERF_PACK_BITS == 512
   if constexpr (kLanes == kGroup) {
     // Children of cells side by side are mostly every other cell of two groups.
@@ -172,38 +184,50 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
   return out;
 }
 
-/// The mean rotations of eight cells each; false where the cosine of half the angle of one from its
-/// mean is less than `least`. `children`: [octant][kGroup], lanes of the cells, -1 for all eight or
-/// none.
-template <class S, class Cells>
-bool mean_rotation(const Cells& cells, const std::int32_t* children, double least,
+/// The mean of `count` rotations in each lane; false where the cosine of half the angle of one from
+/// it is less than `least`. children: [one][kGroup], lanes of the cells. `all_present`: each lane
+/// has all, or is without a cell; else some may be -1, none.
+template <bool all_present, class S, class Cells>
+bool mean_rotation(const Cells& cells, const std::int32_t* children, int count, double least,
                    kernels::Quat<Pack<S>>& mean) {
   using P = Pack<S>;
-  kernels::Quat<P> of[8];
-  kernels::unrolled<8>(
-      [&](auto octant) { load_rotations(cells, children + kGroup * octant, of[octant]); });
+  constexpr int kMost = 16;
+  if (count > kMost) return false;
+  kernels::Quat<P> of[kMost];
+  P weight[kMost];
+  const P one = P(S(1)), none = P(S(0));
   const auto dot = [](const kernels::Quat<P>& a, const kernels::Quat<P>& b) {
     return fma(a.w, b.w, fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)));
   };
-  const kernels::Quat<P> first = of[0];
-  mean = first;
-  kernels::unrolled<7>([&](auto n) {
-    const kernels::Quat<P>& other = of[n + 1];
-    const P sign = select(dot(first, other) < P(S(0)), P(S(-1)), P(S(1)));  // of one rotation
-    mean = {fma(sign, other.w, mean.w), fma(sign, other.x, mean.x), fma(sign, other.y, mean.y),
-            fma(sign, other.z, mean.z)};
-  });
+  mean = {none, none, none, none};
+  for (int n = 0; n < count; ++n) {
+    const std::int32_t* const lanes = children + kGroup * n;
+    load_rotations(cells, lanes, of[n]);
+    const auto& q = of[n];
+    P sign = select(dot(mean, q) < none, -one, one);  // of one rotation
+    if constexpr (!all_present) {
+      alignas(kPackBytes) S present[P::kLanes];
+      for (int k = 0; k < P::kLanes; ++k) present[k] = lanes[k] < 0 ? S(0) : S(1);
+      weight[n] = load_pack(present);
+      sign *= weight[n];
+    }
+    mean = {fma(sign, q.w, mean.w), fma(sign, q.x, mean.x), fma(sign, q.y, mean.y),
+            fma(sign, q.z, mean.z)};
+  }
   mean = kernels::normalised(mean);
   const P square = P(static_cast<S>(least * least));
-  auto near = P(S(0)) < P(S(1));
-  kernels::unrolled<8>([&](auto octant) {
-    const P cosine = dot(mean, of[octant]);
-    near = near && !(cosine * cosine < square);
-  });
-  if (all(near)) return true;
+  auto near = none < one;
+  for (int n = 0; n < count; ++n) {
+    const P cosine = dot(mean, of[n]);
+    if constexpr (all_present)
+      near = near && !(cosine * cosine < square);
+    else
+      near = near && !(cosine * cosine < square * weight[n]);
+  }
+  if (!all_present || all(near)) return all(near);
   P absent;  // the rotation of such a lane is anyone's
   for (int k = 0; k < P::kLanes; ++k) absent.set(k, children[k] < 0 ? S(1) : S(0));
-  return all(near || absent > P(S(0)));
+  return all(near || absent > none);
 }
 
 }  // namespace kerf::cpu

@@ -86,6 +86,7 @@ void FastBackend<S>::load(const Hierarchy& hierarchy) {
         make_patches(hierarchy, l, l == 0 ? nullptr : &levels_[l - 1].patched, threads_);
     if (!follows) level.patched.forget_rows();
     level.bound = 0;
+    level.matrices.forget_unrotated();
     level.solution_is_zero = false;
     const std::size_t scalars = kTileScalars * level.patched.tiles();
     level.inverse_diagonals.assign(level.patched.tiles(), follows);
@@ -127,14 +128,41 @@ void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestRotatio
     rotations.put(static_cast<std::size_t>(finest.lane[moves.cells[n].to]), before[n]);
 }
 
+/// Matrices without rotation of groups that have other cells than `before`, per lane, or cells with
+/// other cells or supports below. `stale`: cells of the level before with others; becomes those of
+/// this level.
+template <class S>
+void FastBackend<S>::forget_unrotated(const LevelChange& change, const PatchMoves& moves,
+                                      const std::vector<std::int32_t>& before, std::size_t level,
+                                      std::vector<std::int32_t>& stale) {
+  StoredMatrices<S>& matrices = levels_[level].matrices;
+  const PatchedLevel& packed = levels_[level].patched;
+  for (std::int32_t& cell : stale) cell = hierarchy_->levels[level - 1].parent[cell];
+  stale.insert(stale.end(), change.cells.begin(), change.cells.end());
+  std::sort(stale.begin(), stale.end());
+  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
+  for (const std::int32_t cell : stale)
+    matrices.forget_unrotated(static_cast<std::size_t>(packed.lane[cell] / kGroup));
+  for (const Range& groups : moves.groups)
+    for (std::int32_t g = groups.first; g < groups.end(); ++g) {
+      const auto cells = packed.cell.begin() + kGroup * g;
+      if (kGroup * static_cast<std::size_t>(g) >= before.size() ||
+          !std::equal(cells, cells + kGroup, before.begin() + kGroup * g))
+        matrices.forget_unrotated(static_cast<std::size_t>(g));
+    }
+}
+
 template <class S>
 void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& change) {
   ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
           "a change is not one of the hierarchy that was loaded");
   settle();
   PatchMoves moves;
+  std::vector<std::int32_t> stale;
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
+    const std::vector<std::int32_t> cells_before =
+        l == 0 ? std::vector<std::int32_t>{} : level.patched.cell;
     moves = update_patches(hierarchy, change, l, l == 0 ? nullptr : &levels_[l - 1].patched,
                            l == 0 ? nullptr : &moves, threads_, level.patched);
     level.bound = 0;
@@ -146,7 +174,12 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       renumber(moves.vertices, size, level.vectors.held(x).exact);
     }
     level.vectors.set_scalars(size);
-    if (l == 0) renumber(moves, level.patched, rotations_);
+    if (l == 0) {
+      renumber(moves, level.patched, rotations_);
+      stale = moves.others;
+    } else {
+      forget_unrotated(change.levels[l], moves, cells_before, l, stale);
+    }
   }
   load_coarsest();
 }
@@ -167,7 +200,10 @@ void FastBackend<S>::release(int x) {
 template <class S>
 void FastBackend<S>::set_operator(const OperatorScale& scale) {
   if (scale.stiffness != scale_.stiffness || scale.mass != scale_.mass) {
-    for (FastLevel<S>& level : levels_) level.bound = 0;
+    for (FastLevel<S>& level : levels_) {
+      level.bound = 0;
+      level.matrices.forget_unrotated();
+    }
     factored_ = false;
   }
   scale_ = scale;

@@ -161,15 +161,19 @@ template <class S>
 void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& matrices,
                           const SlotTable<S>& table, std::size_t group, const BlockPoints<S>& to) {
   using P = Pack<S>;
-  const auto scale = [](const P& unit, kernels::Sym3<P>& b) {
-    b = {unit * b.xx, unit * b.xy, unit * b.xz, unit * b.yy, unit * b.yz, unit * b.zz};
-  };
+  const bool turned = matrices.is_turned(group);
   for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) {
+    kernels::Mat3<P> R;
+    if (turned) R = kernels::to_matrix(matrices.rotation(group, first));
+    const auto finish = [&](const P& unit, kernels::Sym3<P>& b) {
+      b = {unit * b.xx, unit * b.xy, unit * b.xz, unit * b.yy, unit * b.yz, unit * b.zz};
+      if (turned) b = kernels::turned(R, b);
+    };
     matrices.read(group, first, [&](const auto& entries, const P& unit, auto translations) {
       kernels::Sym3<P> blocks[8];
       if (!level.folded(group)) {
         kernels::mode_diagonal_blocks<translations()>(entries, blocks);
-        for (kernels::Sym3<P>& block : blocks) scale(unit, block);
+        for (kernels::Sym3<P>& block : blocks) finish(unit, block);
         to.template add<row()>(points, blocks);
         return;
       }
@@ -183,7 +187,7 @@ void add_stored_diagonals(const PatchedLevel& level, const StoredMatrices<S>& ma
           table.modes(fold.places, slot, m);
           kernels::stored_slot_block<translations()>(all, m, blocks[slot]);
         }
-        scale(unit, blocks[slot]);
+        finish(unit, blocks[slot]);
         to.add(fold.slots + kGroup * slot, blocks[slot]);
       }
     });

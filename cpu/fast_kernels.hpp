@@ -123,14 +123,22 @@ void finest_products(const PatchedLevel& level, const Values& values, const Oper
 template <class S>
 void stored_products(const PatchedLevel& level, const StoredMatrices<S>& matrices,
                      std::size_t group, const S* x, S* y) {
+  const bool turned = matrices.is_turned(group);
   for_corners<S>(level, group, [&](const std::uint16_t* points, auto row, int first) KERF_FLATTEN {
     kernels::Vec3<Pack<S>> at[8];
     gather_corners<row()>(points, x, at);
+    kernels::Mat3<Pack<S>> R;
+    if (turned) {
+      R = kernels::to_matrix(matrices.rotation(group, first));
+      for (auto& v : at) v = kernels::transpose_times(R, v);
+    }
     matrices.read(group, first, [&](const auto& entries, const Pack<S>& unit, auto translations) {
       if constexpr (std::is_same_v<std::decay_t<decltype(entries)>, CodedEntries>)
         for (auto& v : at) v *= unit;
       kernels::apply_mode_matrix<translations()>(entries, at, at);
     });
+    if (turned)
+      for (auto& v : at) v = R * v;
     add_corners<row()>(points, at, y);
   });
 }

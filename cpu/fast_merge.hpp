@@ -33,8 +33,9 @@ struct FinestLanes {
   static constexpr int kMixed = -2;
 
   template <class Stored>
-  FinestLanes(const PatchedLevel& level, const FinestRotations<Stored>& rotations,
-              const OperatorScale& scale, const std::int32_t* cells) {
+  FinestLanes(const FinestCells<Stored>& from, const OperatorScale& scale,
+              const std::int32_t* cells) {
+    const PatchedLevel& level = from.level;
     std::int32_t lanes[P::kLanes];
     for (int k = 0; k < P::kLanes; ++k) {
       cell[k] = cells[k];
@@ -45,7 +46,7 @@ struct FinestLanes {
       any_held = any_held || level.held[cell[k]] != kFree;
       material = material == kAnyMaterial || material == its ? its : kMixed;
     }
-    load_elements(FinestCells<Stored>{level, rotations}, scale, lanes, kAnyMaterial, element);
+    load_elements(from, scale, lanes, kAnyMaterial, element);
   }
 };
 
@@ -286,22 +287,44 @@ struct AddedEntries {
   Entry operator[](int entry) const { return {to[entry]}; }
 };
 
-/// Adds the matrices of cells in some lanes (-1: none) of which only rotations are stored.
+/// Turns the matrices of cells in some lanes (-1: none) that are stored without rotation.
 template <class S>
-void add_turned(const TurnedCells<S>& cells, const std::vector<PackedMaterial<S>>& materials,
-                const OperatorScale& scale, const std::int32_t (&lanes)[Pack<S>::kLanes],
-                Pack<S> (&sum)[kEntries]) {
+void turn_gathered(const StoredCells<S>& cells, const std::int32_t (&lanes)[Pack<S>::kLanes],
+                   Pack<S> (&entries)[kEntries]) {
   std::int32_t turned[Pack<S>::kLanes];
+  bool any = false;
+  for (int k = 0; k < Pack<S>::kLanes; ++k) {
+    turned[k] = lanes[k] >= 0 && cells.is_turned(lanes[k]) ? lanes[k] : -1;
+    any = any || turned[k] >= 0;
+  }
+  if (!any) return;
+  alignas(kPackBytes) S q[4][Pack<S>::kLanes];
   for (int k = 0; k < Pack<S>::kLanes; ++k)
-    turned[k] =
-        lanes[k] >= 0 && cells.matrices.is_turned(static_cast<std::size_t>(lanes[k] / kGroup))
+    for (int c = 0; c < 4; ++c)
+      q[c][k] = turned[k] >= 0 ? cells.rotation(static_cast<std::size_t>(turned[k]))[kGroup * c]
+                               : S(c == 0 ? 1 : 0);
+  kernels::turn_mode_matrix(
+      kernels::to_matrix(kernels::Quat<Pack<S>>{load_pack(q[0]), load_pack(q[1]), load_pack(q[2]),
+                                                load_pack(q[3])}),
+      entries);
+}
+
+/// Adds the matrices of cells in some lanes (-1: none) that are elements.
+template <class S>
+void add_elements(const StoredCells<S>& cells, const std::vector<PackedMaterial<S>>& materials,
+                  const OperatorScale& scale, const std::int32_t (&lanes)[Pack<S>::kLanes],
+                  Pack<S> (&sum)[kEntries]) {
+  std::int32_t elements[Pack<S>::kLanes];
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    elements[k] =
+        lanes[k] >= 0 && cells.matrices.is_element(static_cast<std::size_t>(lanes[k] / kGroup))
             ? lanes[k]
             : -1;
-  const std::uint64_t present = materials_of<S>(cells, turned, 1, materials.size());
+  const std::uint64_t present = materials_of<S>(cells, elements, 1, materials.size());
   for (std::size_t m = 0; m < materials.size() && present != 0; ++m) {
     if (((present >> (m % 64)) & 1) == 0) continue;
     kernels::FinestChild<Pack<S>> child;
-    load_elements(cells, scale, turned, static_cast<int>(m), child);
+    load_elements(cells, scale, elements, static_cast<int>(m), child);
     kernels::finest_mode_matrix(kernels::to_matrix(child.rotation), child.stiffness, child.mass,
                                 materials[m].modes, AddedEntries<Pack<S>>{sum});
   }

@@ -303,18 +303,33 @@ class FastBackend final : public Backend {
     const std::vector<CellKind>& kinds = levels_[0].patched.kinds;
     return level == 0 ? kinds[kind] : cpu::element_kind(kinds, kind);
   }
-  TurnedCells<S> turned_cells(int level) const {
-    return {levels_[0].patched, levels_[level].patched, levels_[level].matrices};
+  FinestCells<S> finest_cells(bool unrotated = false) const {
+    return {levels_[0].patched, rotations_, unrotated};
   }
+  StoredCells<S> stored_cells(int level, bool unrotated = false) const {
+    return {levels_[0].patched, levels_[level].patched, levels_[level].matrices, unrotated};
+  }
+  bool turns_with_supports(std::int32_t cell) const;
+  std::vector<std::int32_t> general_children(int level, std::size_t group) const;
   template <class Cells>
-  void turn(int level, const Cells& children);
-  void gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
+  void turn_group(int level, std::size_t group, const Cells& cells);
+  template <class Cells>
+  void turn(int level, const Cells& cells);
+  void gather_matrices(int level, bool unrotated, const std::int32_t (&lanes)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
-  void corner_children(const std::int32_t (&child)[Pack<S>::kLanes],
+  void corner_children(bool unrotated, const std::int32_t (&child)[Pack<S>::kLanes],
                        Pack<S> (&out)[kEntries]) const;
-  void add_by_slots(const std::int32_t (&child)[Pack<S>::kLanes], Pack<S> (&sum)[kEntries]) const;
-  void merge_general_finest(std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
-  void merge_general_stored(int fine, std::size_t group, int first, Pack<S> (&out)[kEntries]) const;
+  void add_by_slots(bool unrotated, const std::int32_t (&child)[Pack<S>::kLanes],
+                    Pack<S> (&sum)[kEntries]) const;
+  void merge_general_finest(std::size_t group, int first, bool unrotated,
+                            Pack<S> (&out)[kEntries]) const;
+  void merge_general_stored(int fine, std::size_t group, int first, bool unrotated,
+                            Pack<S> (&out)[kEntries]) const;
+  void merge(int fine, std::size_t group, int first, bool unrotated,
+             Pack<S> (&out)[kEntries]) const;
+  void forget_unrotated(const LevelChange& change, const PatchMoves& moves,
+                        const std::vector<std::int32_t>& before, std::size_t level,
+                        std::vector<std::int32_t>& stale);
   template <class Value>
   void chebyshev_step(int level, const Value& value, double step, bool put);
   void chebyshev(int level);
@@ -421,7 +436,7 @@ void FastBackend<S>::add_products(int level, std::size_t group, const T* x, T* y
   if (level == 0) {
     finest_products(l.patched, values_of<T>(), scale_, group, x, y);
   } else if constexpr (std::is_same_v<T, S>) {
-    if (!l.matrices.is_turned(group)) return stored_products(l.patched, l.matrices, group, x, y);
+    if (!l.matrices.is_element(group)) return stored_products(l.patched, l.matrices, group, x, y);
     const CellKind kind = element_kind(level, group);
     element_products(
         l.patched, kind, materials<S>()[kind.material], scale_, group,

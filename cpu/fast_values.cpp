@@ -14,33 +14,36 @@
 
 namespace kerf::cpu {
 
-/// The matrices of some cells of a stored level, one a lane (-1: none).
+/// The matrices of some cells of a stored level, one a lane (-1: none). `unrotated`: as if none had
+/// turned; needs  all of them turned.
 template <class S>
-void FastBackend<S>::gather_matrices(int level, const std::int32_t (&lanes)[Pack<S>::kLanes],
+void FastBackend<S>::gather_matrices(int level, bool unrotated,
+                                     const std::int32_t (&lanes)[Pack<S>::kLanes],
                                      Pack<S> (&out)[kEntries]) const {
-  const FastLevel<S>& l = levels_[level];
-  l.matrices.gather(lanes, out);
-  add_turned(turned_cells(level), materials<S>(), scale_, lanes, out);
+  const StoredCells<S> cells = stored_cells(level, unrotated);
+  cells.matrices.gather(lanes, out);
+  if (!unrotated) turn_gathered(cells, lanes, out);
+  add_elements(cells, materials<S>(), scale_, lanes, out);
 }
 
 // Cells of level 0 in some lanes over their corners, zero where those are held.
 template <class S>
-void FastBackend<S>::corner_children(const std::int32_t (&child)[Pack<S>::kLanes],
+void FastBackend<S>::corner_children(bool unrotated, const std::int32_t (&child)[Pack<S>::kLanes],
                                      Pack<S> (&out)[kEntries]) const {
   const PatchedLevel& packed = levels_[0].patched;
-  const FinestLanes<S> lanes(packed, rotations_, scale_, child);
+  const FinestLanes<S> lanes(finest_cells(unrotated), scale_, child);
   corner_matrices(packed, materials<S>(), lanes, out);
   if (lanes.any_held) mask_matrices(packed, lanes, out);
 }
 
 // Some children of the coarse cells in the lanes, one each, of level 0.
 template <class S>
-void FastBackend<S>::add_by_slots(const std::int32_t (&child)[Pack<S>::kLanes],
+void FastBackend<S>::add_by_slots(bool unrotated, const std::int32_t (&child)[Pack<S>::kLanes],
                                   Pack<S> (&sum)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel& packed = levels_[0].patched;
   P entries[kEntries], full[24][24];
-  corner_matrices(packed, materials<S>(), FinestLanes<S>(packed, rotations_, scale_, child),
+  corner_matrices(packed, materials<S>(), FinestLanes<S>(finest_cells(unrotated), scale_, child),
                   entries);
   kernels::expand_packed(static_cast<const P*>(entries), full);
   SlotColumns<P>(*packed.level, child).add_product(full, sum);
@@ -61,7 +64,7 @@ void for_rounds(const GeneralChildren& children, const Body& body) {
 }
 
 template <class S>
-void FastBackend<S>::merge_general_finest(std::size_t group, int first,
+void FastBackend<S>::merge_general_finest(std::size_t group, int first, bool unrotated,
                                           Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel &from = levels_[0].patched, &to = levels_[1].patched;
@@ -75,31 +78,33 @@ void FastBackend<S>::merge_general_finest(std::size_t group, int first,
   std::fill(std::begin(out), std::end(out), P(0));
   for_rounds<P>(children, [&](const auto& child, unsigned present) {
     kernels::coarsen_corners<P>(
-        [&](int octant, P(&entries)[kEntries]) { corner_children(child[octant], entries); },
+        [&](int octant, P(&entries)[kEntries]) {
+          corner_children(unrotated, child[octant], entries);
+        },
         present, static_cast<P*>(some));
     add_some();
   });
   std::int32_t child[P::kLanes];
   for (int n = 0; children.others(0, n, ChildWay::whole, child); ++n) {
-    corner_children(child, some);
+    corner_children(unrotated, child, some);
     add_some();
   }
   for (int octant = 0; octant < 8; ++octant)
     for (int n = 0; children.others(octant, n, ChildWay::slots, child); ++n) {
-      add_by_slots(child, out);
+      add_by_slots(unrotated, child, out);
       any_other = true;
     }
   if (any_other) kernels::modes_from_corners<P>(out, out);
   if (!children.any_plain()) return;
   std::fill(std::begin(some), std::end(some), P(0));
-  merge_elements(FinestCells<S>{from, rotations_}, materials<S>(), scale_, children.plain(), some);
+  merge_elements(finest_cells(unrotated), materials<S>(), scale_, children.plain(), some);
   for (int e = 0; e < kEntries; ++e) out[e] += some[e];
 }
 
 // Behind the end of a cut two duplicates of one place can have one parent. A child that is passed
 // on is the only one, so these have none.
 template <class S>
-void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first,
+void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first, bool unrotated,
                                           Pack<S> (&out)[kEntries]) const {
   using P = Pack<S>;
   const PatchedLevel &from = levels_[fine].patched, &to = levels_[fine + 1].patched;
@@ -113,90 +118,165 @@ void FastBackend<S>::merge_general_stored(int fine, std::size_t group, int first
         lanes[kGroup * octant + k] = cell < 0 ? -1 : from.lane[cell];
       }
     P some[kEntries];
-    merge_stored<S>([&](const auto& of, auto& entries) { gather_matrices(fine, of, entries); },
-                    lanes, false, true, some);
+    merge_stored<S>(
+        [&](const auto& of, auto& entries) { gather_matrices(fine, unrotated, of, entries); },
+        lanes, false, true, some);
     for (int e = 0; e < kEntries; ++e) out[e] += some[e];
   });
 }
 
-// Rotations of the cells of a level that are one element each, or may be. Eight elements of one
-// rotation are exactly one of twice the side. In single precision, where matrices only
-// precondition, nearly one rotation is enough: to the mean of each eight, on each level anew.
+/// Whether what a cell of level 0 adds to its parent turns as it does: held vertices are so along
+/// all axes.
+template <class S>
+bool FastBackend<S>::turns_with_supports(std::int32_t cell) const {
+  const Level& level = *levels_[0].patched.level;
+  const auto& slots = level.slots[cell];
+  return std::all_of(slots.begin(), slots.end(),
+                     [&](std::int32_t v) { return level.fixed[v] == 0 || level.fixed[v] == 7; });
+}
+
+/// Lanes of the children of a group that are not wholly held, [n][kGroup], -1: none; however many
+/// there are in an octant.
+template <class S>
+std::vector<std::int32_t> FastBackend<S>::general_children(int level, std::size_t group) const {
+  const PatchedLevel &from = levels_[level - 1].patched, &to = levels_[level].patched;
+  std::vector<std::int32_t> out;
+  for (std::size_t k = 0; k < kGroup; ++k) {
+    const std::int32_t cell = to.cell[kGroup * group + k];
+    if (cell < 0) continue;
+    std::size_t n = k;
+    for (const std::int32_t child : to.level->children_of(cell)) {
+      if (from.held[child] == kWhollyHeld) continue;
+      if (n >= out.size()) out.resize(out.size() + kGroup, -1);
+      out[n] = from.lane[child];
+      n += kGroup;
+    }
+  }
+  return out;
+}
+
+// Eight elements of one rotation are exactly one of twice the side, and what is merged from cells
+// of one rotation turns as they do. In single precision, where matrices only precondition, nearly
+// one rotation is enough: to the mean of those of the children, on each level anew.
 template <class S>
 template <class Cells>
-void FastBackend<S>::turn(int level, const Cells& cells) {
+void FastBackend<S>::turn_group(int level, std::size_t group, const Cells& cells) {
   constexpr double kNear = 0.1;  // radians
   const double least = std::cos(0.5 * kNear);
   FastLevel<S>& to = levels_[level];
-  const PatchedLevel& packed = to.patched;
+  StoredMatrices<S>& matrices = to.matrices;
+  const std::uint16_t kind = to.patched.kind[group];
+  const std::int32_t* children = to.patched.children.data() + 8 * kGroup * group;
+  const bool general = kind == kGeneral || kind == kGeneralPassed;
+  const bool passed =
+      kind == kPassed || kind == kHeldPassed || (is_of_finest(kind) && !is_of_eight(kind));
   // The mass of lumped cells is not that of a lumped one.
   const bool may_be_one = !kIsDouble && level + 1 < static_cast<int>(levels_.size()) &&
                           (scale_.mass == 0 || !hierarchy_->lumped_mass);
+  const bool element =
+      matrices.is_element(group) && (passed || (may_be_one && cells.are_elements(children)));
+  if (!element) matrices.store_matrices(group);
+  if (!element && (kIsDouble || matrices.never_turns(group))) return matrices.do_not_turn(group);
+  std::vector<std::int32_t> others;
+  int count = passed ? 1 : 8;
+  if (general) {
+    others = general_children(level, group);
+    children = others.data();
+    count = static_cast<int>(others.size() / kGroup);
+  }
+  const auto is_turned = [&](std::int32_t lane) { return lane < 0 || cells.is_turned(lane); };
+  const bool are_turned = element || std::all_of(children, children + kGroup * count, is_turned);
+  if (!are_turned) return matrices.do_not_turn(group);
+  bool near = true;
+  for_packs<S>([&](int first) {
+    kernels::Quat<Pack<S>> rotation;
+    if (passed)
+      load_rotations(cells, children + first, rotation);
+    else if (element)
+      near = mean_rotation<true, S>(cells, children + first, count, least, rotation) && near;
+    else
+      near = mean_rotation<false, S>(cells, children + first, count, least, rotation) && near;
+    matrices.store(group, first, rotation);
+  });
+  if (!near) matrices.do_not_turn(group);
+}
+
+/// Which cells of a level are turned, and how far.
+template <class S>
+template <class Cells>
+void FastBackend<S>::turn(int level, const Cells& cells) {
+  const PatchedLevel& from = levels_[level - 1].patched;
+  const PatchedLevel& packed = levels_[level].patched;
+  StoredMatrices<S>& matrices = levels_[level].matrices;
   const auto groups = static_cast<std::int32_t>(packed.groups());
   parallel(groups, kWorthGroups, [&](std::int32_t g) {
     const auto group = static_cast<std::size_t>(g);
-    if (!is_of_finest(packed.kind[group])) return;
-    const bool eight = is_of_eight(packed.kind[group]);
-    const std::int32_t* const all = packed.children.data() + 8 * kGroup * group;
-    bool is_one = !eight || (may_be_one && cells.are_all(all));
-    if (is_one)
-      for_packs<S>([&](int first) {
-        const std::int32_t* const children = all + first;
-        kernels::Quat<Pack<S>> rotation;
-        if (!eight)
-          load_rotations(cells, children, rotation);
-        else if (!mean_rotation<S>(cells, children, least, rotation))
-          is_one = false;
-        to.matrices.store(group, first, rotation);
-      });
-    if (!is_one) to.matrices.do_not_turn(group);
+    if (!matrices.is_turned(group)) return;
+    const std::uint16_t kind = packed.kind[group];
+    if (level == 1 && (kind == kGeneral || kind == kGeneralPassed) &&
+        !matrices.knows_unrotated(group) && !matrices.never_turns(group)) {
+      const auto lanes = general_children(level, group);
+      if (!std::all_of(lanes.begin(), lanes.end(), [&](std::int32_t lane) {
+            return lane < 0 || turns_with_supports(from.cell[lane]);
+          }))
+        matrices.never_turn(group);
+    }
+    turn_group(level, group, cells);
   });
+}
+
+/// The matrices of the cells of a group from those of their children.
+template <class S>
+void FastBackend<S>::merge(int fine, std::size_t group, int first, bool unrotated,
+                           Pack<S> (&out)[kEntries]) const {
+  const FastLevel<S>& to = levels_[fine + 1];
+  const std::uint16_t kind = to.patched.kind[group];
+  const bool passed = kind == kPassed || kind == kHeldPassed;
+  const std::int32_t* children = to.patched.children.data() + 8 * kGroup * group + first;
+  const auto cells = to.patched.cell.begin() + static_cast<std::ptrdiff_t>(kGroup * group) + first;
+  if (std::all_of(cells, cells + Pack<S>::kLanes, [](std::int32_t c) { return c < 0; }))
+    std::fill(out, out + kEntries, Pack<S>(0));
+  else if (kind == kGeneral || kind == kGeneralPassed)
+    fine == 0 ? merge_general_finest(group, first, unrotated, out)
+              : merge_general_stored(fine, group, first, unrotated, out);
+  else if (fine == 0)
+    merge_elements(finest_cells(unrotated), materials<S>(), scale_, children, out);
+  else if (const auto below = stored_cells(fine, unrotated);
+           !passed && below.template are_elements<Pack<S>::kLanes>(children))
+    merge_elements(below, materials<S>(), scale_, children, out);
+  else
+    merge_stored<S>(
+        [&](const auto& lanes, auto& entries) { gather_matrices(fine, unrotated, lanes, entries); },
+        children, passed, to.matrices.with_translations(group), out);
 }
 
 template <class S>
 void FastBackend<S>::coarsen(int fine) {
-  using P = Pack<S>;
-  const FastLevel<S>& from = levels_[fine];
   FastLevel<S>& to = levels_[fine + 1];
   const PatchedLevel& packed = to.patched;
   const bool coarsest = fine + 2 == static_cast<int>(levels_.size());
-  to.matrices.start(packed, fine == 0 && !coarsest, scale_.mass != 0);
+  to.matrices.start(packed, fine == 0 && !coarsest, scale_.mass != 0, !kIsDouble && !coarsest);
   if (fine == 0)
-    turn(1, FinestCells<S>{from.patched, rotations_});
+    turn(1, finest_cells());
   else
-    turn(fine + 1, turned_cells(fine));
+    turn(fine + 1, stored_cells(fine));
   to.matrices.allocate();
   const auto groups = static_cast<std::int32_t>(packed.groups());
-  const std::vector<PackedMaterial<S>>& all = materials<S>();
   // General cells cost many times as much as others, and lie together.
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 8) if (groups >= kWorthGroups)
   for (std::int32_t g = 0; g < groups; ++g) {
     const FlushToZero flush;
     const auto group = static_cast<std::size_t>(g);
-    const std::uint16_t kind = packed.kind[group];
-    if (kind == kNoCells || kind == kIdle || to.matrices.is_turned(group)) continue;
-    const bool passed = kind == kPassed || kind == kHeldPassed;
+    if (packed.kind[group] == kNoCells || packed.kind[group] == kIdle) continue;
+    const bool unrotated = to.matrices.is_turned(group);
+    if (unrotated && (to.matrices.is_element(group) || to.matrices.knows_unrotated(group)))
+      continue;
     for_packs<S>([&](int first) {
-      const std::int32_t* children = packed.children.data() + 8 * kGroup * group + first;
-      const auto cells = packed.cell.begin() + kGroup * g + first;
-      P out[kEntries];
-      if (std::all_of(cells, cells + P::kLanes, [](std::int32_t c) { return c < 0; })) {
-        std::fill(out, out + kEntries, P(0));
-        return to.matrices.store(group, first, out);
-      }
-      if (kind == kGeneral || kind == kGeneralPassed)
-        fine == 0 ? merge_general_finest(group, first, out)
-                  : merge_general_stored(fine, group, first, out);
-      else if (fine == 0)
-        merge_elements(FinestCells<S>{from.patched, rotations_}, all, scale_, children, out);
-      else if (!passed && turned_cells(fine).template are_all<P::kLanes>(children))
-        merge_elements(turned_cells(fine), all, scale_, children, out);
-      else
-        merge_stored<S>(
-            [&](const auto& lanes, auto& entries) { gather_matrices(fine, lanes, entries); },
-            children, passed, to.matrices.with_translations(group), out);
+      Pack<S> out[kEntries];
+      merge(fine, group, first, unrotated, out);
       to.matrices.store(group, first, out);
     });
+    if (unrotated) to.matrices.know_unrotated(group);
   }
 }
 
@@ -254,7 +334,7 @@ void FastBackend<S>::prepare(int level) {
     for (std::int32_t g = patch.groups.first; g < patch.groups.end(); ++g) {
       const auto group = static_cast<std::size_t>(g);
       if (packed.idle(group)) continue;
-      if (level > 0 && !l.matrices.is_turned(group)) {
+      if (level > 0 && !l.matrices.is_element(group)) {
         add_stored_diagonals(packed, l.matrices, folds_, group, to);
         continue;
       }
@@ -294,7 +374,7 @@ void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<d
   using P = Pack<double>;
   const PatchedLevel& packed = levels_[level].patched;
   if (level == 0) {
-    const FinestLanes<double> lanes(packed, rotations_, scale_, cells);
+    const FinestLanes<double> lanes(FinestCells<S>{packed, rotations_}, scale_, cells);
     corner_matrices(packed, materials<double>(), lanes, out);
     if (lanes.any_folded) fold_matrices<P>(packed, cells, out);
     if (lanes.any_held) mask_matrices(packed, lanes, out);
@@ -308,7 +388,7 @@ void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<d
       any_folded = any_folded || kernels::has_hanging(packed.level->fold[cells[k]]);
     }
     Pack<S> entries[kEntries];
-    gather_matrices(level, lanes, entries);
+    gather_matrices(level, false, lanes, entries);
     for (int e = 0; e < kEntries; ++e)
       for (int k = 0; k < P::kLanes; ++k) out[e].set(k, static_cast<double>(entries[e][k]));
     kernels::corners_from_modes<P>(out, out);

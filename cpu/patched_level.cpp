@@ -222,7 +222,7 @@ class Patcher {
                                                     !is_same(level_, cells[i], change_->before[i]));
       touch(all[i], marks[i]);
     });
-    for (std::size_t i = 0; i < all.size(); ++i) list(all[i], marks[i]);
+    for (std::size_t i = 0; i < all.size(); ++i) list(all[i], marks[i], i >= cells.size());
     if (above == nullptr) return;
     in_chunks(above->cells.size(), [&](std::size_t i) {  // rows of the transfer
       const std::int32_t parent = above->cells[i];
@@ -301,8 +301,9 @@ class Patcher {
     if (is_new(c) || mark.slots_changed) touch_transfers(c);
   }
 
-  void list(std::int32_t c, const CellMark& mark) {
-    if (mark.held_changed || mark.kind_changed) moves_.others.push_back(c);
+  void list(std::int32_t c, const CellMark& mark, bool beside) {
+    const bool vertex_held_otherwise = beside && finer_ == nullptr;
+    if (mark.held_changed || mark.kind_changed || vertex_held_otherwise) moves_.others.push_back(c);
     Work& work = works_[patch_of(c)];
     if (is_new(c)) {
       work.arrived.push_back(c);

@@ -297,10 +297,12 @@ struct PatchMoves {
   struct Move {
     std::int32_t from, to;
   };
-  std::vector<Move> vertices;        ///< packed numbers
-  std::vector<Move> cells;           ///< lane (of a new cell: that of its origin), and the cell
-  std::vector<Range> groups;         ///< whose lanes are others now
-  std::vector<std::int32_t> others;  ///< cells that are new, or have another HeldCell or kind
+  std::vector<Move> vertices;  ///< packed numbers
+  std::vector<Move> cells;     ///< lane (of a new cell: that of its origin), and the cell
+  std::vector<Range> groups;   ///< whose lanes are others now
+  /// Cells that are new, or have another HeldCell or kind; of level 0 those too that have a vertex
+  /// held otherwise.
+  std::vector<std::int32_t> others;
   std::vector<char> tiles;  ///< whether vertices of a tile are others, or take other values
 
   void touch(std::int32_t packed) {

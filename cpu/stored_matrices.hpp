@@ -4,8 +4,10 @@
 // cells of a group side by side.
 //
 // Layout  [group][entry][lane]. A group without translations stores the first 231 entries alone.
-// Turned  Where cells are one element each, their rotations are stored instead: cells of level 0
-//         that are passed on, and where the backend says so, eight elements as one.
+// Turned  A group has rotations where its matrices are R A R^T: products turn what they read and
+//         write, A is stored without rotation, and stays as it is while cells turn. Nothing but the
+//         rotations is stored of cells that are one element each: those of level 0 that are passed
+//         on, and where the backend says so, eight elements as one.
 // Codes   Products with stored matrices cost the bytes of their entries. In single precision those
 //         of level 1 are 16-bit integers, multiples of one number a cell: the greatest entry over
 //         32767. So they are off by at most 1.5e-5 of it, which a preconditioner does not notice.
@@ -69,42 +71,77 @@ class StoredMatrices {
  public:
   using P = Pack<S>;
 
-  /// What the groups of a level are, with room for rotations; all groups that may be turned are.
-  void start(const PatchedLevel& level, bool coded, bool with_mass) {
-    traits_.clear();
+  /// What the groups of a level are, with room for rotations; all that may be elements are, and
+  /// all that may be turned: elements alone, or any.
+  void start(const PatchedLevel& level, bool coded, bool with_mass, bool any_turned) {
+    traits_.resize(level.groups());
+    known_.resize(level.groups());
     rotations_at_.clear();
     std::uint32_t rotations = 0;
     for (std::size_t g = 0; g < level.groups(); ++g) {
-      const bool held = is_held(level.kind[g]), turned = is_of_finest(level.kind[g]);
+      const bool held = is_held(level.kind[g]), element = is_of_finest(level.kind[g]);
       const bool none = level.kind[g] == kNoCells || level.kind[g] == kIdle;
+      const bool turned = element || (any_turned && !none);
       const bool is_coded = coded && std::is_same_v<S, float> && !held;
-      traits_.push_back(static_cast<std::uint8_t>((with_mass || held ? kFull : 0) |
-                                                  (is_coded ? kCoded : 0) | (none ? kNone : 0) |
-                                                  (turned ? kTurned : 0)));
+      const auto traits = static_cast<std::uint8_t>(
+          (with_mass || held ? kFull : 0) | (is_coded ? kCoded : 0) | (none ? kNone : 0) |
+          (element ? kMayBeElement | kElement : 0) | (turned ? kTurned : 0));
+      constexpr int kLayout = kFull | kCoded | kNone | kMayBeElement;
+      if (((traits ^ traits_[g]) & kLayout) != 0) known_[g] = Known::no;
+      traits_[g] = traits;
       rotations_at_.push_back(rotations);
       rotations += turned ? 1 : 0;
     }
     rotations_.resize(4 * kGroup * std::size_t{rotations});
   }
-  /// A group that is not to be turned.
+  /// A group that is no element, or not to be turned either.
+  void store_matrices(std::size_t group) { clear(group, kElement); }
   void do_not_turn(std::size_t group) {
-    traits_[group] = static_cast<std::uint8_t>(traits_[group] & ~kTurned);
+    clear(group, kElement | kTurned);
+    if (known_[group] == Known::yes) known_[group] = Known::no;
   }
-  /// Room for the matrices of all other groups.
+  /// Room for the matrices of all groups that are no elements. Those that may be lie behind all
+  /// others, so that these stay where they are while cells turn.
   void allocate() {
-    begin_.clear();
+    std::vector<std::uint32_t> begin(traits_.size());
     std::size_t plain = 0, codes = 0;
-    for (std::size_t g = 0; g < traits_.size(); ++g) {
-      std::size_t& size = is_coded(g) ? codes : plain;
-      begin_.push_back(static_cast<std::uint32_t>(size));
-      if ((traits_[g] & (kNone | kTurned)) == 0) size += static_cast<std::size_t>(entries_of(g));
+    bool any_known = false, moved = false;
+    for (const int may_be : {0, int{kMayBeElement}})
+      for (std::size_t g = 0; g < traits_.size(); ++g) {
+        if ((traits_[g] & kMayBeElement) != may_be) continue;
+        std::size_t& size = is_coded(g) ? codes : plain;
+        begin[g] = static_cast<std::uint32_t>(size);
+        if (is_stored(g)) size += static_cast<std::size_t>(entries_of(g));
+        if (!knows_unrotated(g)) continue;
+        any_known = true;
+        moved = moved || begin[g] != begin_[g];
+      }
+    if (moved) {
+      move_known(plain_, kGroup * plain, false, begin);
+      move_known(codes_, kGroup * codes, true, begin);
+    } else {
+      make_room(plain_, kGroup * plain, any_known);
+      make_room(codes_, kGroup * codes, any_known);
     }
-    make_room(plain_, kGroup * plain);
-    make_room(codes_, kGroup * codes);
     unit_.resize(codes > 0 ? kGroup * traits_.size() : 0);
+    begin_ = std::move(begin);
   }
 
   bool is_turned(std::size_t group) const { return (traits_[group] & kTurned) != 0; }
+  bool is_element(std::size_t group) const { return (traits_[group] & kElement) != 0; }
+
+  /// Whether what is stored of a group is its matrix without rotation, and still right.
+  bool knows_unrotated(std::size_t group) const { return known_[group] == Known::yes; }
+  void know_unrotated(std::size_t group) { known_[group] = Known::yes; }
+  /// Whether a group cannot be turned at all, whatever its rotations.
+  bool never_turns(std::size_t group) const { return known_[group] == Known::never; }
+  void never_turn(std::size_t group) { known_[group] = Known::never; }
+  /// What is stored of one, or all, is not right any more.
+  void forget_unrotated(std::size_t group) {
+    if (group < known_.size()) known_[group] = Known::no;
+  }
+  void forget_unrotated() { std::fill(known_.begin(), known_.end(), Known::no); }
+
   void store(std::size_t group, int first, const kernels::Quat<P>& q) {
     store_quaternion(rotations_.data() + rotations_of(group) + first, q);
   }
@@ -120,8 +157,8 @@ class StoredMatrices {
 
   bool with_translations(std::size_t group) const { return (traits_[group] & kFull) != 0; }
   std::size_t bytes() const {
-    return bytes_of(begin_) + bytes_of(rotations_at_) + bytes_of(traits_) + bytes_of(rotations_) +
-           bytes_of(plain_) + bytes_of(codes_) + bytes_of(unit_);
+    return bytes_of(begin_) + bytes_of(rotations_at_) + bytes_of(traits_) + bytes_of(known_) +
+           bytes_of(rotations_) + bytes_of(plain_) + bytes_of(codes_) + bytes_of(unit_);
   }
 
   /// Of the lanes from `first` on.
@@ -153,8 +190,8 @@ class StoredMatrices {
     with(PlainEntries<S>{plain_.data() + at + static_cast<std::size_t>(first)}, P(S(1)));
   }
 
-  /// The entries of single cells, one a lane (-1: none), and zero where they are not stored or the
-  /// cell is turned.
+  /// The entries of single cells as they are stored, one a lane (-1: none), and zero where they are
+  /// not or the cell is an element.
   void gather(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     if constexpr (std::is_same_v<S, float>)
       gather_packs(lanes, out);
@@ -163,18 +200,38 @@ class StoredMatrices {
   }
 
  private:
-  /// How many are stored changes with the rotations. What was there is not moved along.
+  /// How many are stored changes with the rotations.
   template <class T>
-  static void make_room(Array<T>& array, std::size_t size) {
+  static void make_room(Array<T>& array, std::size_t size, bool keep) {
     if (size > array.capacity()) {
       const bool is_first = array.capacity() == 0;
-      array = {};
+      if (!keep) array = {};
       array.reserve(is_first ? size : size + size / 8);
     }
     array.resize(size);
   }
+  /// What is known, to where it is to begin.
+  template <class T>
+  void move_known(Array<T>& array, std::size_t size, bool coded,
+                  const std::vector<std::uint32_t>& begin) const {
+    Array<T> moved;
+    moved.reserve(size + size / 8);
+    moved.resize(size);
+    for (std::size_t g = 0; g < traits_.size(); ++g)
+      if (knows_unrotated(g) && is_coded(g) == coded)
+        std::copy_n(array.begin() + static_cast<std::ptrdiff_t>(kGroup * std::size_t{begin_[g]}),
+                    kGroup * entries_of(g),
+                    moved.begin() + static_cast<std::ptrdiff_t>(kGroup * std::size_t{begin[g]}));
+    array = std::move(moved);
+  }
 
-  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4, kTurned = 8;
+  void clear(std::size_t group, int traits) {
+    traits_[group] = static_cast<std::uint8_t>(traits_[group] & ~traits);
+  }
+
+  static constexpr std::uint8_t kFull = 1, kCoded = 2, kNone = 4, kMayBeElement = 8, kElement = 16,
+                                kTurned = 32;
+  enum class Known : std::uint8_t { no, yes, never };
   bool is_coded(std::size_t group) const { return (traits_[group] & kCoded) != 0; }
   std::size_t rotations_of(std::size_t group) const {
     return 4 * kGroup * std::size_t{rotations_at_[group]};
@@ -183,7 +240,7 @@ class StoredMatrices {
     return with_translations(group) ? kernels::kEntries : kernels::kModeEntries;
   }
 
-  bool is_stored(std::size_t group) const { return (traits_[group] & (kNone | kTurned)) == 0; }
+  bool is_stored(std::size_t group) const { return (traits_[group] & (kNone | kElement)) == 0; }
 
   void gather_packs(const std::int32_t (&lanes)[P::kLanes], P (&out)[kernels::kEntries]) const {
     LaneSources<std::int16_t> codes;
@@ -256,8 +313,9 @@ class StoredMatrices {
   }
 
   std::vector<std::uint32_t> begin_;         // per group: entries before it, in its array
-  std::vector<std::uint32_t> rotations_at_;  // per group: such groups before it
+  std::vector<std::uint32_t> rotations_at_;  // per group: those with room for them before it
   std::vector<std::uint8_t> traits_;         // per group
+  std::vector<Known> known_;                 // per group: whether its matrix without rotation is
   Array<S> rotations_;                       // [w x y z][lane] of each
   Array<S> plain_;
   Array<std::int16_t> codes_;

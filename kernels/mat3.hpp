@@ -166,6 +166,15 @@ KERF_HD Vec3<T> operator*(const Sym3<T>& a, const Vec3<T>& v) {
           a.xz * v.x + a.yz * v.y + a.zz * v.z};
 }
 
+/// R a R^T.
+template <class T>
+KERF_HD Sym3<T> turned(const Mat3<T>& R, const Sym3<T>& a) {
+  const Vec3<T> x{R[0][0], R[0][1], R[0][2]}, y{R[1][0], R[1][1], R[1][2]};
+  const Vec3<T> z{R[2][0], R[2][1], R[2][2]};
+  const Vec3<T> ax = a * x, ay = a * y, az = a * z;
+  return {dot(x, ax), dot(y, ax), dot(z, ax), dot(y, ay), dot(z, ay), dot(z, az)};
+}
+
 template <class T, class Mask>
 KERF_HD void swap_if(const Mask& mask, T& a, T& b) {
   const T kept = a;

@@ -474,6 +474,21 @@ KERF_HD void mode_diagonal_blocks(const Matrix& A, Sym3<T> (&D)[kCorners]) {
             by_class[2][n], by_class[4][n], by_class[5][n]};
 }
 
+/// A = R A R^T, R of each corner and so of each mode. All 300 entries.
+template <class T, class Matrix>
+KERF_HD void turn_mode_matrix(const Mat3<T>& R, Matrix& A) {
+  const Mat3<T> transposed = transpose(R);
+  for (int s = 0; s < kCorners; ++s)
+    for (int t = s; t < kCorners; ++t) {
+      Mat3<T> block;
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) block[i][k] = A[mode_entry(s, i, t, k)];
+      block = R * block * transposed;
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < (s == t ? i + 1 : 3); ++k) A[mode_entry(s, i, t, k)] = block[i][k];
+    }
+}
+
 /// One of two halves of the congruence with H or H^T: the 24 rows or columns as eight vectors.
 template <bool corners, class T>
 KERF_HD void convert_row(T (&row)[kUnknowns]) {

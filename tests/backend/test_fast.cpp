@@ -77,7 +77,8 @@ void expect_operators_alike(const Problem& p, Backend& finest, Backend& coarse,
   }
 }
 
-// Where eight cells have nearly one rotation, the next level has the matrix of their mean.
+// Where the children of a cell have nearly one rotation, it has the matrix of their mean: from
+// eight of one kind, and from whatever else a cut and hanging corners leave.
 TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
   const Problem p = cut_octree();
   const Vector u = p.deformation();
@@ -88,8 +89,10 @@ TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
   std::vector<double> rotations(4 * p.hierarchy.values.size());
   exact.backend->read_rotations(rotations);
   const AsOne ones = test::as_one(p, rotations);
-  EXPECT_GT(ones.eights[1], 4);
-  EXPECT_LT(*std::max_element(ones.farthest.begin(), ones.farthest.end()), 0.1);
+  EXPECT_GT(ones.count[0][1], 4);
+  EXPECT_GT(ones.count[1][1], 10);
+  for (const auto& farthest : ones.farthest)
+    EXPECT_LT(*std::max_element(farthest.begin(), farthest.end()), 0.1);
   expect_operators_alike(p, *exact.backend, *mean.backend, ones.rotations, *mixed.backend);
 }
 
@@ -107,7 +110,9 @@ TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
     const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
     const Loaded mean(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
     const Loaded mixed(p, test::make_backend("mixed"), kDynamic, {}, p.deformation());
-    for (const auto& [off, slope] : {std::pair{0.0, 0.01}, std::pair{0.09, 0.01},
+    // Of cells of several sizes one may be passed on beside the mean of eight.
+    const double within = refinement == 0 ? 0.09 : 0.06;
+    for (const auto& [off, slope] : {std::pair{0.0, 0.01}, std::pair{within, 0.01},
                                      std::pair{0.11, 0.01}, std::pair{0.0, 0.05}}) {
       SCOPED_TRACE(::testing::Message()
                    << off << " and " << slope << " radians, refinement " << refinement);
@@ -125,12 +130,12 @@ TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
       turn_to(p, *exact.backend, rotations);
       turn_to(p, *mixed.backend, rotations);
       const AsOne ones = test::as_one(p, rotations, 0.1);
-      EXPECT_GT(ones.eights[1], 100);
-      EXPECT_NEAR(ones.farthest[1], off, 1e-6);
+      EXPECT_GT(ones.count[0][1], 100);
+      EXPECT_NEAR(ones.farthest[0][1], off, 1e-6);
       if (off < 0.1) {
-        EXPECT_GT(ones.eights[2], 20);
-        EXPECT_NEAR(ones.farthest[2], 3 * slope, 1e-6);
-        EXPECT_EQ(ones.eights[3] > 0, slope < 0.05 && refinement == 0);
+        EXPECT_GT(ones.count[0][2], 20);
+        EXPECT_NEAR(ones.farthest[0][2], 3 * slope, 1e-6);
+        EXPECT_EQ(ones.count[0][3] > 0, slope < 0.05 && refinement == 0);
       }
       expect_operators_alike(p, *exact.backend, *mean.backend, ones.rotations, *mixed.backend);
       if (off == 0) continue;  // else the two references differ, so that one of them is not met

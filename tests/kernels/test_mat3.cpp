@@ -92,6 +92,16 @@ TEST(RelaxVertex, SolvesItsBlockAndHonoursOmega) {
   }
 }
 
+TEST(Sym3, TurnsAsItsFullMatrixDoes) {
+  Random random(6);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Matrix3 B = random.matrix3(), A = B + B.transpose();
+    const Matrix3 R = random.quaternion().toRotationMatrix();
+    const Matrix3 found = to_eigen(turned(to_mat3<double>(R), to_sym3(A)).full());
+    EXPECT_LT((found - R * A * R.transpose()).norm(), kRoundOff * A.norm());
+  }
+}
+
 TEST(Quat, MatrixAndProductAgreeWithEigen) {
   Random random(5);
   for (int trial = 0; trial < 100; ++trial) {

@@ -406,6 +406,21 @@ TEST(ApplyModeMatrix, EqualsTheProductByCorners) {
   }
 }
 
+// With rows and columns of each corner turned, and so of each mode.
+TEST(TurnModeMatrix, TurnsEveryCorner) {
+  Random random(87);
+  for (int i = 0; i < 20; ++i) {
+    const Matrix24 A = random.symmetric24();
+    const Eigen::Quaterniond q = random.quaternion();
+    Matrix24 turn = Matrix24::Zero();
+    for (int n = 0; n < 24; n += 3) turn.block<3, 3>(n, n) = q.toRotationMatrix();
+    Packed found = to_modes_of(to_packed<double>(A));
+    kernels::turn_mode_matrix(to_matrix(to_quat<double>(q)), found);
+    const Packed expected = to_modes_of(to_packed<double>(Matrix24(turn * A * turn.transpose())));
+    EXPECT_LT(relative_error(found, expected), kRoundOff);
+  }
+}
+
 double block_error(const Sym3<double> (&D)[8], const Packed& corners) {
   double out = 0;
   for (int i = 0; i < 8; ++i)

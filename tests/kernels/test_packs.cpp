@@ -188,6 +188,7 @@ TYPED_TEST(PointsOfPacks, AreReadAndAddedToAsPairs) {
 template <class S>
 struct NumberedCells {
   std::vector<S> all = std::vector<S>(4 * cpu::kGroup * 4);
+  bool unrotated = false;
 
   NumberedCells() { std::iota(all.begin(), all.end(), S(1)); }
   const S* rotation(std::size_t lane) const {
@@ -223,6 +224,18 @@ TYPED_TEST(PointsOfPacks, RotationsOfCellsAreThoseOfTheirLanes) {
   expect_lanes([](int k) { return k % 3 == 2 ? -1 : 2 * k; });
   expect_lanes([](int k) { return k == Pack<S>::kLanes - 1 ? 3 : 2 * k; });
   expect_lanes([](int) { return -1; });
+}
+
+TYPED_TEST(PointsOfPacks, RotationsOfCellsAreNoneWhereNoneIsAskedFor) {
+  using S = TypeParam;
+  NumberedCells<S> cells;
+  cells.unrotated = true;
+  std::array<std::int32_t, Pack<S>::kLanes> lanes;
+  std::iota(lanes.begin(), lanes.end(), 3);
+  kernels::Quat<Pack<S>> q;
+  cpu::load_rotations(cells, lanes.data(), q);
+  for (int k = 0; k < Pack<S>::kLanes; ++k)
+    EXPECT_EQ((kernels::Quat<S>{q.w[k], q.x[k], q.y[k], q.z[k]}), (kernels::Quat<S>{1, 0, 0, 0}));
 }
 
 // As two numbers of single precision they have 48 bits, and parting the sum again changes nothing.
@@ -477,7 +490,7 @@ cpu::StoredMatrices<S> some_matrices(bool coded, bool with_mass) {
                 cpu::kNoCells, cpu::kMerged};
   level.cell.resize(cpu::kGroup * level.kind.size());
   cpu::StoredMatrices<S> out;
-  out.start(level, coded, with_mass);
+  out.start(level, coded, with_mass, false);
   out.allocate();
   std::uint64_t count = 0;
   for (const std::size_t group : {0, 1, 4, 5, 7})

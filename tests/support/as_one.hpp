@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Cells of coarse levels that may be one element each: from one such cell, or from eight of one
-// kind, one an octant, none of them held, where no corner hangs. What the operator of each level is
-// made from where all of these turn as their mean does.
+// Cells of coarse levels that turn as one: those whose children do, all nearly by the mean of
+// these. What the operator of each level is made from where all of these turn as their mean does.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <tuple>
@@ -22,61 +22,79 @@ namespace kerf::test {
 
 struct AsOne {
   std::vector<std::vector<double>> rotations;  ///< per level: of the cells of level 0
-  std::vector<int> eights;                     ///< per level: cells that are from eight
-  std::vector<double> farthest;  ///< per level: of one of eight from the mean, radians
+  // Per level; [0] of cells that are from eight of one kind, [1] of all others: from fewer, or of
+  // several kinds, or with held vertices.
+  std::vector<int> count[2];        ///< whose children turn as one each
+  std::vector<double> farthest[2];  ///< of a child from the mean, radians
 };
 
 namespace detail {
 
-struct Element {
+/// What a cell is that turns as one.
+struct Turned {
   Eigen::Vector4d rotation;
-  std::tuple<int, int, double, double> kind;  // of its cells of level 0
+  bool held;                                  // wholly: it has no say
+  std::tuple<int, int, double, double> kind;  // of its cells of level 0, if they are of one
+  bool is_element;                            // one, or eight of them
 };
-using Elements = std::vector<std::optional<Element>>;  // per cell
+using TurnedCells = std::vector<std::optional<Turned>>;  // per cell
 
-inline Elements finest_elements(const Problem& p, const std::vector<double>& rotations) {
+inline TurnedCells finest_cells(const Problem& p, const std::vector<double>& rotations) {
   const Level& level = p.hierarchy.levels[0];
-  Elements out(level.corner.size());
+  TurnedCells out(level.corner.size());
   for (std::size_t c = 0; c < out.size(); ++c) {
     const CellValues& values = p.hierarchy.values[c];
-    if (std::all_of(level.slots[c].begin(), level.slots[c].end(),
-                    [&](std::int32_t v) { return level.fixed[v] == 0; }))
-      out[c] = Element{Eigen::Map<const Eigen::Vector4d>(&rotations[4 * c]),
-                       {level.size_log2[c], values.material, values.stiffness, values.mass}};
+    const auto are_held = [&](std::initializer_list<int> as) {
+      return std::all_of(level.slots[c].begin(), level.slots[c].end(), [&](std::int32_t v) {
+        return std::find(as.begin(), as.end(), level.fixed[v]) != as.end();
+      });
+    };
+    if (are_held({0, 7}))  // else along some axes alone, which do not turn
+      out[c] = Turned{Eigen::Map<const Eigen::Vector4d>(&rotations[4 * c]),
+                      are_held({7}),
+                      {level.size_log2[c], values.material, values.stiffness, values.mass},
+                      are_held({0})};
   }
   return out;
 }
 
-inline Elements next_elements(const Problem& p, std::size_t l, const Elements& below, double near,
-                              AsOne& all) {
+inline TurnedCells next_cells(const Problem& p, std::size_t l, const TurnedCells& below,
+                              double near, AsOne& all) {
   const Level &fine = p.hierarchy.levels[l - 1], &level = p.hierarchy.levels[l];
-  Elements out(level.corner.size());
+  TurnedCells out(level.corner.size());
   for (std::int32_t c = 0; c < level.cells(); ++c) {
     const auto children = level.children_of(c);
-    const std::optional<Element>& first = below[children[0]];
-    if (!first) continue;
-    if (fine.place[children[0]] == Level::kPassed) {
-      out[c] = first;
+    if (!std::all_of(children.begin(), children.end(),
+                     [&](std::int32_t child) { return below[child].has_value(); }))
+      continue;
+    std::vector<Turned> with_say;
+    for (const std::int32_t child : children)
+      if (!below[child]->held) with_say.push_back(*below[child]);
+    if (with_say.empty()) {
+      out[c] = below[children[0]];
       continue;
     }
-    if (children.size() != 8 || kernels::has_hanging(level.fold[c]) ||
-        !std::all_of(children.begin(), children.end(), [&](std::int32_t child) {
-          return below[child] && below[child]->kind == first->kind;
-        }))
-      continue;
-    Element one{Eigen::Vector4d::Zero(), first->kind};
-    for (const std::int32_t child : children) {
-      const Eigen::Vector4d& q = below[child]->rotation;
-      one.rotation += q.dot(first->rotation) < 0 ? Eigen::Vector4d(-q) : q;
-    }
+    const Turned& first = with_say[0];
+    Turned one{Eigen::Vector4d::Zero(), false, first.kind, false};
+    for (const Turned& child : with_say)
+      one.rotation += child.rotation.dot(first.rotation) < 0 ? Eigen::Vector4d(-child.rotation)
+                                                             : child.rotation;
     one.rotation.normalize();
     double farthest = 0;
-    for (const std::int32_t child : children) {
-      const double cosine = std::abs(one.rotation.dot(below[child]->rotation));
+    for (const Turned& child : with_say) {
+      const double cosine = std::abs(one.rotation.dot(child.rotation));
       farthest = std::max(farthest, 2 * std::acos(std::min(1.0, cosine)));
     }
-    all.farthest[l] = std::max(all.farthest[l], farthest);
-    ++all.eights[l];
+    const bool alike = std::all_of(with_say.begin(), with_say.end(), [&](const Turned& child) {
+      return child.is_element && child.kind == first.kind;
+    });
+    const bool passed = fine.place[children[0]] == Level::kPassed;
+    const bool eight =
+        !passed && alike && with_say.size() == 8 && !kernels::has_hanging(level.fold[c]);
+    one.is_element = alike && (passed || eight);
+    double& most = all.farthest[eight ? 0 : 1][l];
+    most = std::max(most, farthest);
+    ++all.count[eight ? 0 : 1][l];
     if (farthest <= near) out[c] = one;
   }
   return out;
@@ -84,27 +102,32 @@ inline Elements next_elements(const Problem& p, std::size_t l, const Elements& b
 
 }  // namespace detail
 
-/// Cells of the coarsest level are never one, nor are eight of which one is farther than `near`.
+/// Cells of the coarsest level never turn as one, nor do those of which a child is farther from the
+/// mean than `near`.
 inline AsOne as_one(const Problem& p, const std::vector<double>& rotations,
                     double near = std::numeric_limits<double>::infinity()) {
   const auto levels = static_cast<std::size_t>(p.levels());
-  AsOne out{{rotations}, std::vector<int>(levels), std::vector<double>(levels)};
-  detail::Elements elements = detail::finest_elements(p, rotations);
-  // Of each cell of level 0: the cell of this level that it is in, -1 once that is not an element.
-  std::vector<std::int32_t> in(elements.size());
-  for (std::size_t c = 0; c < in.size(); ++c)
-    in[c] = elements[c] ? static_cast<std::int32_t>(c) : -1;
+  AsOne out;
+  out.rotations = {rotations};
+  for (int i = 0; i < 2; ++i) {
+    out.count[i].resize(levels);
+    out.farthest[i].resize(levels);
+  }
+  detail::TurnedCells cells = detail::finest_cells(p, rotations);
+  // Of each cell of level 0: the cell of this level that it is in, -1 once that does not turn.
+  std::vector<std::int32_t> in(cells.size());
+  for (std::size_t c = 0; c < in.size(); ++c) in[c] = cells[c] ? static_cast<std::int32_t>(c) : -1;
   for (std::size_t l = 1; l < levels; ++l) {
     out.rotations.push_back(out.rotations.back());
     if (l + 1 == levels) break;
-    elements = detail::next_elements(p, l, elements, near, out);
+    cells = detail::next_cells(p, l, cells, near, out);
     for (std::size_t c = 0; c < in.size(); ++c) {
       if (in[c] < 0) continue;
       in[c] = p.hierarchy.levels[l - 1].parent[in[c]];
-      if (!elements[in[c]])
+      if (!cells[in[c]])
         in[c] = -1;
       else
-        std::copy_n(elements[in[c]]->rotation.data(), 4,
+        std::copy_n(cells[in[c]]->rotation.data(), 4,
                     out.rotations[l].begin() + 4 * static_cast<std::ptrdiff_t>(c));
     }
   }
