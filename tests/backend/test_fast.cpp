@@ -98,7 +98,7 @@ TEST(MixedPrecision, OperatorsAreThoseOfTheReferenceToSinglePrecision) {
 
 // Rotations that differ from parent to parent, and by a little or somewhat more within one, or in
 // one of the parents; every other one as its negative, which is the same.
-TEST(MixedPrecision, EightCellsAreOneElementUpToATenthOfARadian) {
+TEST(MixedPrecision, CellsTurnAsOneUpToATenthOfARadian) {
   ProblemOptions options;
   options.holds = test::Holds::one_side;
   options.coarsest_vertices = 60;
