@@ -52,7 +52,8 @@ inline constexpr Work kCycleJacobi{1571, 208, 335};
 inline constexpr Work kCyclePaper{4541, 1665, 3059};
 /// Two Newton steps from the gradient: 51 + 2 * 85; read u and q, write q.
 inline constexpr Work kRotate{221, 44, 56};
-/// Level 0 to 1 to 2 with level 1 never stored, and a seventh of that beyond.
+/// Galerkin products: level 0 to 1 to 2 with level 1 never stored, and a seventh of that beyond. In
+/// `mixed` cells that turn as one need none (docs/decisions/0028-without-rotation.md), and less.
 inline constexpr Work kCoarsen{465, 33, 33};
 /// The same by nodal weights, level 1 stored.
 inline constexpr Work kCoarsenPaper{5550, 337, 659};
