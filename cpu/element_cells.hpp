@@ -13,7 +13,6 @@
 
 #include "cpu/fast_kernels.hpp"
 #include "kernels/mode_coarsen.hpp"
-#include "kernels/unrolled.hpp"
 
 namespace kerf::cpu {
 
@@ -184,6 +183,10 @@ std::uint64_t materials_of(const Cells& cells, const std::int32_t* lanes, int oc
   return out;
 }
 
+/// Children of a cell that may turn as one: eight, and what a cut leaves behind its end in their
+/// octants. Of more it is Galerkin.
+inline constexpr int kMostTurned = 16;
+
 /// The mean of `count` rotations in each lane; false where the cosine of half the angle of one from
 /// it is less than `least`. children: [one][kGroup], lanes of the cells. `all_present`: each lane
 /// has all, or is without a cell; else some may be -1, none.
@@ -191,10 +194,8 @@ template <bool all_present, class S, class Cells>
 bool mean_rotation(const Cells& cells, const std::int32_t* children, int count, double least,
                    kernels::Quat<Pack<S>>& mean) {
   using P = Pack<S>;
-  constexpr int kMost = 16;
-  if (count > kMost) return false;
-  kernels::Quat<P> of[kMost];
-  P weight[kMost];
+  kernels::Quat<P> of[all_present ? 8 : kMostTurned];
+  P weight[all_present ? 1 : kMostTurned];
   const P one = P(S(1)), none = P(S(0));
   const auto dot = [](const kernels::Quat<P>& a, const kernels::Quat<P>& b) {
     return fma(a.w, b.w, fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)));

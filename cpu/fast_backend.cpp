@@ -179,6 +179,7 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       stale = moves.others;
     } else {
       forget_unrotated(change.levels[l], moves, cells_before, l, stale);
+      stale.insert(stale.end(), moves.others.begin(), moves.others.end());
     }
   }
   load_coarsest();

@@ -310,7 +310,8 @@ class FastBackend final : public Backend {
     return {levels_[0].patched, levels_[level].patched, levels_[level].matrices, unrotated};
   }
   bool turns_with_supports(std::int32_t cell) const;
-  std::vector<std::int32_t> general_children(int level, std::size_t group) const;
+  int general_children(int level, std::size_t group,
+                       std::int32_t (&out)[kMostTurned * kGroup]) const;
   template <class Cells>
   void turn_group(int level, std::size_t group, const Cells& cells);
   template <class Cells>

@@ -136,23 +136,24 @@ bool FastBackend<S>::turns_with_supports(std::int32_t cell) const {
 }
 
 /// Lanes of the children of a group that are not wholly held, [n][kGroup], -1: none; however many
-/// there are in an octant.
+/// there are in an octant. Returns the greatest n + 1; none fit if that is above kMostTurned.
 template <class S>
-std::vector<std::int32_t> FastBackend<S>::general_children(int level, std::size_t group) const {
+int FastBackend<S>::general_children(int level, std::size_t group,
+                                     std::int32_t (&out)[kMostTurned * kGroup]) const {
   const PatchedLevel &from = levels_[level - 1].patched, &to = levels_[level].patched;
-  std::vector<std::int32_t> out;
-  for (std::size_t k = 0; k < kGroup; ++k) {
-    const std::int32_t cell = to.cell[kGroup * group + k];
+  std::fill(std::begin(out), std::end(out), -1);
+  int most = 0;
+  for (int k = 0; k < kGroup; ++k) {
+    const std::int32_t cell = to.cell[kGroup * group + static_cast<std::size_t>(k)];
     if (cell < 0) continue;
-    std::size_t n = k;
+    int n = 0;
     for (const std::int32_t child : to.level->children_of(cell)) {
       if (from.held[child] == kWhollyHeld) continue;
-      if (n >= out.size()) out.resize(out.size() + kGroup, -1);
-      out[n] = from.lane[child];
-      n += kGroup;
+      if (n < kMostTurned) out[kGroup * n + k] = from.lane[child];
+      most = std::max(most, ++n);
     }
   }
-  return out;
+  return most;
 }
 
 // Eight elements of one rotation are exactly one of twice the side, and what is merged from cells
@@ -163,10 +164,10 @@ template <class Cells>
 void FastBackend<S>::turn_group(int level, std::size_t group, const Cells& cells) {
   constexpr double kNear = 0.1;  // radians
   const double least = std::cos(0.5 * kNear);
-  FastLevel<S>& to = levels_[level];
-  StoredMatrices<S>& matrices = to.matrices;
-  const std::uint16_t kind = to.patched.kind[group];
-  const std::int32_t* children = to.patched.children.data() + 8 * kGroup * group;
+  StoredMatrices<S>& matrices = levels_[level].matrices;
+  const PatchedLevel& packed = levels_[level].patched;
+  const std::uint16_t kind = packed.kind[group];
+  const std::int32_t* children = packed.children.data() + 8 * kGroup * group;
   const bool general = kind == kGeneral || kind == kGeneralPassed;
   const bool passed =
       kind == kPassed || kind == kHeldPassed || (is_of_finest(kind) && !is_of_eight(kind));
@@ -175,14 +176,25 @@ void FastBackend<S>::turn_group(int level, std::size_t group, const Cells& cells
                           (scale_.mass == 0 || !hierarchy_->lumped_mass);
   const bool element =
       matrices.is_element(group) && (passed || (may_be_one && cells.are_elements(children)));
-  if (!element) matrices.store_matrices(group);
-  if (!element && (kIsDouble || matrices.never_turns(group))) return matrices.do_not_turn(group);
-  std::vector<std::int32_t> others;
+  if (element)
+    matrices.forget_unrotated(group);
+  else
+    matrices.store_matrices(group);
+  if (!matrices.is_turned(group) || matrices.never_turns(group)) return matrices.do_not_turn(group);
+  std::int32_t others[kMostTurned * kGroup];
   int count = passed ? 1 : 8;
   if (general) {
-    others = general_children(level, group);
-    children = others.data();
-    count = static_cast<int>(others.size() / kGroup);
+    children = others;
+    count = general_children(level, group, others);
+    if (count > kMostTurned) return matrices.do_not_turn(group);
+    const PatchedLevel& from = levels_[level - 1].patched;
+    if (level == 1 && !matrices.knows_unrotated(group) &&
+        !std::all_of(others, others + kGroup * count, [&](std::int32_t lane) {
+          return lane < 0 || turns_with_supports(from.cell[lane]);
+        })) {
+      matrices.never_turn(group);
+      return matrices.do_not_turn(group);
+    }
   }
   const auto is_turned = [&](std::int32_t lane) { return lane < 0 || cells.is_turned(lane); };
   const bool are_turned = element || std::all_of(children, children + kGroup * count, is_turned);
@@ -205,23 +217,11 @@ void FastBackend<S>::turn_group(int level, std::size_t group, const Cells& cells
 template <class S>
 template <class Cells>
 void FastBackend<S>::turn(int level, const Cells& cells) {
-  const PatchedLevel& from = levels_[level - 1].patched;
-  const PatchedLevel& packed = levels_[level].patched;
-  StoredMatrices<S>& matrices = levels_[level].matrices;
-  const auto groups = static_cast<std::int32_t>(packed.groups());
+  const StoredMatrices<S>& matrices = levels_[level].matrices;
+  const auto groups = static_cast<std::int32_t>(levels_[level].patched.groups());
   parallel(groups, kWorthGroups, [&](std::int32_t g) {
     const auto group = static_cast<std::size_t>(g);
-    if (!matrices.is_turned(group)) return;
-    const std::uint16_t kind = packed.kind[group];
-    if (level == 1 && (kind == kGeneral || kind == kGeneralPassed) &&
-        !matrices.knows_unrotated(group) && !matrices.never_turns(group)) {
-      const auto lanes = general_children(level, group);
-      if (!std::all_of(lanes.begin(), lanes.end(), [&](std::int32_t lane) {
-            return lane < 0 || turns_with_supports(from.cell[lane]);
-          }))
-        matrices.never_turn(group);
-    }
-    turn_group(level, group, cells);
+    if (matrices.is_turned(group)) turn_group(level, group, cells);
   });
 }
 

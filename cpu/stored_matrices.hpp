@@ -20,8 +20,10 @@
 #include <cmath>
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "core/base/array.hpp"
 #include "cpu/codes.hpp"
 #include "cpu/lane_picker.hpp"
 #include "cpu/patched_level.hpp"
@@ -74,6 +76,7 @@ class StoredMatrices {
   /// What the groups of a level are, with room for rotations; all that may be elements are, and
   /// all that may be turned: elements alone, or any.
   void start(const PatchedLevel& level, bool coded, bool with_mass, bool any_turned) {
+    any_turned_ = any_turned;
     traits_.resize(level.groups());
     known_.resize(level.groups());
     rotations_at_.clear();
@@ -95,7 +98,9 @@ class StoredMatrices {
     rotations_.resize(4 * kGroup * std::size_t{rotations});
   }
   /// A group that is no element, or not to be turned either.
-  void store_matrices(std::size_t group) { clear(group, kElement); }
+  void store_matrices(std::size_t group) {
+    clear(group, any_turned_ ? kElement : kElement | kTurned);
+  }
   void do_not_turn(std::size_t group) {
     clear(group, kElement | kTurned);
     if (known_[group] == Known::yes) known_[group] = Known::no;
@@ -131,7 +136,9 @@ class StoredMatrices {
   bool is_element(std::size_t group) const { return (traits_[group] & kElement) != 0; }
 
   /// Whether what is stored of a group is its matrix without rotation, and still right.
-  bool knows_unrotated(std::size_t group) const { return known_[group] == Known::yes; }
+  bool knows_unrotated(std::size_t group) const {
+    return known_[group] == Known::yes && is_stored(group);
+  }
   void know_unrotated(std::size_t group) { known_[group] = Known::yes; }
   /// Whether a group cannot be turned at all, whatever its rotations.
   bool never_turns(std::size_t group) const { return known_[group] == Known::never; }
@@ -315,8 +322,9 @@ class StoredMatrices {
   std::vector<std::uint32_t> begin_;         // per group: entries before it, in its array
   std::vector<std::uint32_t> rotations_at_;  // per group: those with room for them before it
   std::vector<std::uint8_t> traits_;         // per group
-  std::vector<Known> known_;                 // per group: whether its matrix without rotation is
-  Array<S> rotations_;                       // [w x y z][lane] of each
+  std::vector<Known> known_;  // per group: whether its matrix without rotation is stored
+  bool any_turned_ = false;
+  Array<S> rotations_;  // [w x y z][lane] of each
   Array<S> plain_;
   Array<std::int16_t> codes_;
   Array<S> unit_;  // per lane

@@ -135,6 +135,52 @@ ProblemOptions held_options(int levels) {
   return options;
 }
 
+TEST(UnrotatedMatrices, OfABodyThatIsLoadedAreNotThoseOfTheOneBefore) {
+  const Problem before = test::cut_block({33, 22, 15}, {14.3, 9.2, 7.1}, 8, 60);
+  const Problem p = test::cut_block({33, 22, 15}, {17.3, 12.2, 6.1}, 8, 60);
+  const auto kept = test::make_backend("mixed"), fresh = test::make_backend("mixed");
+  kept->load(before.hierarchy);
+  kept->set_operator(kDynamic);
+  operators_of(before, *kept, rotations_of(before, 0.2, 0));
+  for (Backend* backend : {kept.get(), fresh.get()}) {
+    backend->load(p.hierarchy);
+    backend->set_operator(kDynamic);
+  }
+  const std::vector<double> rotations = rotations_of(p, 0.2, 0);
+  EXPECT_EQ(operators_of(p, *kept, rotations).products,
+            operators_of(p, *fresh, rotations).products);
+}
+
+// A factor is made of it: where its cells are eight of nearly one rotation, too.
+TEST(UnrotatedMatrices, AreNoneOnTheCoarsestLevel) {
+  for (const int levels : {2, 3}) {
+    ProblemOptions options;
+    options.holds = test::Holds::none;
+    options.coarsest_vertices = 1;
+    options.max_levels = levels;
+    options.materials = 1;
+    options.with_oracle = false;
+    const Problem p(LinkedOctree(test::box_body({16, 16, 16}), 0), options);
+    ASSERT_EQ(p.levels(), levels);
+    std::vector<double> rotations;
+    for (std::int32_t c = 0; c < p.level(0).cells(); ++c) {
+      const Vec3i at = p.level(0).corner[c];
+      const double half = 0.2 + (at[0] >> (levels - 2) & 1 ? 0.04 : -0.04);
+      for (const double part : {std::cos(half), 0.0, 0.6 * std::sin(half), 0.8 * std::sin(half)})
+        rotations.push_back(part);
+    }
+    Operators of[2];
+    for (const int i : {0, 1}) {
+      const auto backend = test::make_backend(i == 0 ? "cpu" : "mixed");
+      backend->load(p.hierarchy);
+      backend->set_operator(kDynamic);
+      of[i] = operators_of(p, *backend, rotations);
+    }
+    for (std::size_t n = static_cast<std::size_t>(levels) - 1; n < of[0].products.size(); ++n)
+      ASSERT_LE(relative(of[1].products[n], of[0].products[n]), 2e-6) << n;
+  }
+}
+
 // Groups get other cells, more of them or other places; cells are split, or have vertices that are
 // held otherwise.
 TEST(UnrotatedMatrices, FollowCutsAsIfLoadedAfterThem) {
