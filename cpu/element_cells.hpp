@@ -66,10 +66,12 @@ struct StoredCells {
   bool are_elements(const std::int32_t* lanes) const {
     for (int octant = 0; octant < 8; ++octant)
       for (int k = 0; k < kLanes; ++k)
-        if (const std::int32_t lane = lanes[kGroup * octant + k];
-            lane >= 0 && !matrices.is_element(static_cast<std::size_t>(lane / kGroup)))
+        if (const std::int32_t lane = lanes[kGroup * octant + k]; lane >= 0 && !is_element(lane))
           return false;
     return true;
+  }
+  bool is_element(std::int32_t lane) const {
+    return matrices.is_element(static_cast<std::size_t>(lane / kGroup));
   }
   bool is_turned(std::int32_t lane) const {
     return matrices.is_turned(static_cast<std::size_t>(lane / kGroup));

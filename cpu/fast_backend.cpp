@@ -150,6 +150,7 @@ void FastBackend<S>::forget_unrotated(const LevelChange& change, const PatchMove
           !std::equal(cells, cells + kGroup, before.begin() + kGroup * g))
         matrices.forget_unrotated(static_cast<std::size_t>(g));
     }
+  stale.insert(stale.end(), moves.others.begin(), moves.others.end());
 }
 
 template <class S>
@@ -179,7 +180,6 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       stale = moves.others;
     } else {
       forget_unrotated(change.levels[l], moves, cells_before, l, stale);
-      stale.insert(stale.end(), moves.others.begin(), moves.others.end());
     }
   }
   load_coarsest();

@@ -287,17 +287,26 @@ struct AddedEntries {
   Entry operator[](int entry) const { return {to[entry]}; }
 };
 
+/// Those of some lanes (-1: none) for which is(lane) holds, -1 for others. Whether there are any.
+template <int kLanes, class Is>
+bool pick_lanes(const std::int32_t (&lanes)[kLanes], const Is& is, std::int32_t (&out)[kLanes]) {
+  bool any = false;
+  for (int k = 0; k < kLanes; ++k) {
+    out[k] = lanes[k] >= 0 && is(lanes[k]) ? lanes[k] : -1;
+    any = any || out[k] >= 0;
+  }
+  return any;
+}
+
 /// Turns the matrices of cells in some lanes (-1: none) that are stored without rotation.
 template <class S>
 void turn_gathered(const StoredCells<S>& cells, const std::int32_t (&lanes)[Pack<S>::kLanes],
                    Pack<S> (&entries)[kEntries]) {
   std::int32_t turned[Pack<S>::kLanes];
-  bool any = false;
-  for (int k = 0; k < Pack<S>::kLanes; ++k) {
-    turned[k] = lanes[k] >= 0 && cells.is_turned(lanes[k]) ? lanes[k] : -1;
-    any = any || turned[k] >= 0;
-  }
-  if (!any) return;
+  const auto is_unrotated = [&](std::int32_t lane) {
+    return cells.is_turned(lane) && !cells.is_element(lane);
+  };
+  if (!pick_lanes(lanes, is_unrotated, turned)) return;
   alignas(kPackBytes) S q[4][Pack<S>::kLanes];
   for (int k = 0; k < Pack<S>::kLanes; ++k)
     for (int c = 0; c < 4; ++c)
@@ -315,11 +324,8 @@ void add_elements(const StoredCells<S>& cells, const std::vector<PackedMaterial<
                   const OperatorScale& scale, const std::int32_t (&lanes)[Pack<S>::kLanes],
                   Pack<S> (&sum)[kEntries]) {
   std::int32_t elements[Pack<S>::kLanes];
-  for (int k = 0; k < Pack<S>::kLanes; ++k)
-    elements[k] =
-        lanes[k] >= 0 && cells.matrices.is_element(static_cast<std::size_t>(lanes[k] / kGroup))
-            ? lanes[k]
-            : -1;
+  pick_lanes(
+      lanes, [&](std::int32_t lane) { return cells.is_element(lane); }, elements);
   const std::uint64_t present = materials_of<S>(cells, elements, 1, materials.size());
   for (std::size_t m = 0; m < materials.size() && present != 0; ++m) {
     if (((present >> (m % 64)) & 1) == 0) continue;

@@ -374,7 +374,7 @@ void FastBackend<S>::read_matrices(int level, const std::int32_t (&cells)[Pack<d
   using P = Pack<double>;
   const PatchedLevel& packed = levels_[level].patched;
   if (level == 0) {
-    const FinestLanes<double> lanes(FinestCells<S>{packed, rotations_}, scale_, cells);
+    const FinestLanes<double> lanes(finest_cells(), scale_, cells);
     corner_matrices(packed, materials<double>(), lanes, out);
     if (lanes.any_folded) fold_matrices<P>(packed, cells, out);
     if (lanes.any_held) mask_matrices(packed, lanes, out);

@@ -23,6 +23,22 @@ using test::relative;
 
 constexpr OperatorScale kDynamic{0.8, 400};
 
+ProblemOptions options_of(test::Holds holds, int levels) {
+  ProblemOptions options;
+  options.holds = holds;
+  options.coarsest_vertices = 1;
+  options.max_levels = levels;
+  options.materials = 1;
+  options.with_oracle = false;
+  return options;
+}
+
+/// Adds a turn by twice `half`, in radians.
+void add_rotation(double half, std::vector<double>& out) {
+  for (const double part : {std::cos(half), 0.0, 0.6 * std::sin(half), 0.8 * std::sin(half)})
+    out.push_back(part);
+}
+
 /// Turns cells of level 0 by less than a twentieth of a radian one from the next but one; those
 /// with a smaller x than `wild` anyhow.
 std::vector<double> rotations_of(const Problem& p, double start, double wild) {
@@ -31,10 +47,8 @@ std::vector<double> rotations_of(const Problem& p, double start, double wild) {
   std::vector<double> out;
   for (std::int32_t c = 0; c < finest.cells(); ++c) {
     const Vec3i& at = finest.corner[c];
-    const double half =
-        at[0] < wild ? dice.between(-1, 1) : start + 0.002 * (at[0] + 2 * at[1] + 3 * at[2]);
-    for (const double part : {std::cos(half), 0.0, 0.6 * std::sin(half), 0.8 * std::sin(half)})
-      out.push_back(part);
+    add_rotation(
+        at[0] < wild ? dice.between(-1, 1) : start + 0.002 * (at[0] + 2 * at[1] + 3 * at[2]), out);
   }
   return out;
 }
@@ -125,16 +139,6 @@ void expect_to_follow(Problem& p, int blades, const Blade& blade, const Vertex& 
   }
 }
 
-ProblemOptions held_options(int levels) {
-  ProblemOptions options;
-  options.holds = test::Holds::one_side;
-  options.coarsest_vertices = 1;
-  options.max_levels = levels;
-  options.materials = 1;
-  options.with_oracle = false;
-  return options;
-}
-
 TEST(UnrotatedMatrices, OfABodyThatIsLoadedAreNotThoseOfTheOneBefore) {
   const Problem before = test::cut_block({33, 22, 15}, {14.3, 9.2, 7.1}, 8, 60);
   const Problem p = test::cut_block({33, 22, 15}, {17.3, 12.2, 6.1}, 8, 60);
@@ -154,20 +158,13 @@ TEST(UnrotatedMatrices, OfABodyThatIsLoadedAreNotThoseOfTheOneBefore) {
 // A factor is made of it: where its cells are eight of nearly one rotation, too.
 TEST(UnrotatedMatrices, AreNoneOnTheCoarsestLevel) {
   for (const int levels : {2, 3}) {
-    ProblemOptions options;
-    options.holds = test::Holds::none;
-    options.coarsest_vertices = 1;
-    options.max_levels = levels;
-    options.materials = 1;
-    options.with_oracle = false;
-    const Problem p(LinkedOctree(test::box_body({16, 16, 16}), 0), options);
+    const Problem p(LinkedOctree(test::box_body({16, 16, 16}), 0),
+                    options_of(test::Holds::none, levels));
     ASSERT_EQ(p.levels(), levels);
     std::vector<double> rotations;
     for (std::int32_t c = 0; c < p.level(0).cells(); ++c) {
       const Vec3i at = p.level(0).corner[c];
-      const double half = 0.2 + (at[0] >> (levels - 2) & 1 ? 0.04 : -0.04);
-      for (const double part : {std::cos(half), 0.0, 0.6 * std::sin(half), 0.8 * std::sin(half)})
-        rotations.push_back(part);
+      add_rotation(0.2 + (at[0] >> (levels - 2) & 1 ? 0.04 : -0.04), rotations);
     }
     Operators of[2];
     for (const int i : {0, 1}) {
@@ -187,7 +184,7 @@ TEST(UnrotatedMatrices, FollowCutsAsIfLoadedAfterThem) {
   for (const int refinement : {0, 1, 2}) {
     SCOPED_TRACE(::testing::Message() << "refinement " << refinement);
     const Voxels voxels = test::box_body({33, 18, 14});
-    Problem p(LinkedOctree(voxels, refinement), held_options(4));
+    Problem p(LinkedOctree(voxels, refinement), options_of(test::Holds::one_side, 4));
     test::Dice dice(refinement + 1);
     test::RandomBlades random(voxels.lattice, dice);
     expect_to_follow(
@@ -200,7 +197,7 @@ TEST(UnrotatedMatrices, FollowCutsAsIfLoadedAfterThem) {
 // for some cells, which lose some of those below.
 TEST(UnrotatedMatrices, FollowSmallCutsThroughCellsThatAreCutAlready) {
   const Voxels voxels = test::box_body({64, 48, 48});
-  Problem p(LinkedOctree(voxels, 0), held_options(3));
+  Problem p(LinkedOctree(voxels, 0), options_of(test::Holds::one_side, 3));
   const double h = voxels.lattice.spacing;
   const Vec3d wall = voxels.lattice.origin + h * Vec3d{29.3, 20.4, 18.4};
   expect_to_follow(
