@@ -105,18 +105,17 @@ struct Problem {
       hierarchy.values.push_back({m.young * side, m.density * side * side * side, index});
     }
     hold(finest);
-    build_coarse_levels(hierarchy,
-                        {given.coarsest_vertices, given.max_levels, given.duplicate_cells});
+    build_coarse_levels(hierarchy, hierarchy_options());
     if (given.with_oracle) grids = oracle::grids_like(body, hierarchy, given.duplicate_cells);
   }
   explicit Problem(const std::string& name, const ProblemOptions& given = {})
       : Problem(scene(name), given) {}
 
   /// Brings the hierarchy, not the grids, up to date after a cut of the body; what is new is held
-  /// as its place says, and old vertices that are named (ascending) are held or free in turn.
-  /// Returns false if it would have another number of levels.
+  /// as its place says, and old vertices that are named (ascending) are held or free in turn: of
+  /// components as `bits` says. Returns false if it would have another number of levels.
   bool update(LevelUpdater& updater, const CutEvent& event,
-              const std::vector<std::int32_t>& turned = {}) {
+              const std::vector<std::int32_t>& turned = {}, std::uint8_t bits = 7) {
     updater.update_finest(body, event, hierarchy);
     const LevelChange& change = updater.change().levels[0];
     Level& finest = hierarchy.levels[0];
@@ -131,10 +130,12 @@ struct Problem {
     for (const std::int32_t c : change.cells) hierarchy.values.set(c, value_of(c, c));
     for (std::int32_t v = change.vertices_before; v < finest.vertices(); ++v)
       finest.fixed[v] = options.holds != Holds::none && finest.point[v][0] == 0 ? 7 : 0;
-    for (const std::int32_t v : turned) finest.fixed[v] = finest.fixed[v] == 0 ? 7 : 0;
-    return updater.update_coarse(
-        hierarchy, {options.coarsest_vertices, options.max_levels, options.duplicate_cells},
-        turned);
+    for (const std::int32_t v : turned) finest.fixed[v] = finest.fixed[v] == 0 ? bits : 0;
+    return updater.update_coarse(hierarchy, hierarchy_options(), turned);
+  }
+
+  HierarchyOptions hierarchy_options() const {
+    return {options.coarsest_vertices, options.max_levels, options.duplicate_cells};
   }
 
   int levels() const { return static_cast<int>(hierarchy.levels.size()); }
