@@ -186,7 +186,7 @@ void Simulation::Impl::load_structure() {
     backend->write(0, state.external, structure->external().on_all(hierarchy()));
     backend->mask(0, state.external);
   }
-  solver.set_structure(hierarchy());
+  solver.set_structure(hierarchy(), structure->small_pieces());
   structure->forget_transfers();
   return_freed_memory();
 }
@@ -339,7 +339,7 @@ void Simulation::Impl::update_backend() {
       if ((finest().fixed[loaded[k / 3]] >> (k % 3)) & 1) force[k] = 0;
     backend->write_some(0, state.external, loaded, force);
   }
-  solver.set_structure(hierarchy());
+  solver.set_structure(hierarchy(), structure->small_pieces());
   const AddTime timer(clock.structure);
   const NewVertices fresh = new_vertices(finest(), change);
   std::vector<std::int32_t> numbers(finest().point.size() - change.vertices_before);

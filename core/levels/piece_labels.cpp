@@ -15,11 +15,14 @@ void PieceLabels::build(const Level& finest) {
   piece_.reserve(with_room(cells_));
   piece_.assign(finest.corner.size(), -1);
   count_ = 0;
+  sizes_.clear();
+  small_.clear();
   std::vector<std::int32_t> next;
   for (std::int32_t c = 0; c < finest.cells(); ++c) {
     if (piece_[c] >= 0) continue;
     const auto number = static_cast<std::int32_t>(count_++);
     piece_[c] = number;
+    sizes_.push_back(1);
     next.assign(1, c);
     while (!next.empty()) {
       const std::int32_t cell = next.back();
@@ -27,16 +30,21 @@ void PieceLabels::build(const Level& finest) {
       for (const std::int32_t item : finest.links_of(cell)) {
         if (piece_[item / 8] >= 0) continue;
         piece_[item / 8] = number;
+        ++sizes_.back();
         next.push_back(item / 8);
       }
     }
+    list_small(c, finest);
   }
 }
 
 void PieceLabels::update(const LinkedOctree& body, const CutEvent& event, const Level& finest,
                          const LevelChange& change) {
   ensures(piece_.size() == cells_, "labels that forgot how to change are asked to");
-  for (const std::int32_t origin : change.origin) piece_.push_back(piece_[origin]);
+  for (const std::int32_t origin : change.origin) {
+    piece_.push_back(piece_[origin]);
+    ++sizes_[piece_[origin]];
+  }
   cells_ = piece_.size();
   if (owner_.size() < piece_.size()) owner_.resize(piece_.capacity(), -1);
   std::vector<std::int32_t> ends;
@@ -47,6 +55,23 @@ void PieceLabels::update(const LinkedOctree& body, const CutEvent& event, const 
     for (const std::int32_t cell : part.cells) owner_[cell] = -1;
     for (const std::int32_t cell : part.done) owner_[cell] = -1;
   }
+  for (const std::int32_t cell : ends) list_small(cell, finest);
+  for (std::int32_t c = change.cells_before; c < finest.cells(); ++c) list_small(c, finest);
+}
+
+/// What the piece of a cell has, if it is small; what it had, if it is so no more.
+void PieceLabels::list_small(std::int32_t cell, const Level& finest) {
+  const std::int32_t number = piece_[cell];
+  if (sizes_[number] > kSmall) {
+    if (!small_.empty()) small_.erase(number);
+    return;
+  }
+  std::vector<std::int32_t>& cells = small_[number];
+  cells.assign(1, cell);
+  for (std::size_t head = 0; head < cells.size(); ++head)
+    for (const std::int32_t item : finest.links_of(cells[head]))
+      if (std::find(cells.begin(), cells.end(), item / 8) == cells.end()) cells.push_back(item / 8);
+  std::sort(cells.begin(), cells.end());
 }
 
 // One part for each group of ends that are linked to each other.
@@ -112,6 +137,9 @@ void PieceLabels::grow(std::int32_t part, std::size_t cells, const Level& finest
 }
 
 void PieceLabels::give_number(const Part& part) {
+  const auto size = static_cast<std::int32_t>(part.cells.size() + part.done.size());
+  sizes_[piece_[part.cells[0]]] -= size;
+  sizes_.push_back(size);
   for (const std::int32_t cell : part.cells) piece_[cell] = static_cast<std::int32_t>(count_);
   for (const std::int32_t cell : part.done) piece_[cell] = static_cast<std::int32_t>(count_);
   ++count_;
@@ -140,6 +168,13 @@ void PieceLabels::grow_until_known(const Level& finest) {
     for (const std::int32_t p : growing)
       if (parts_[p].joined < 0) alive.push_back(p);
   }
+}
+
+std::vector<std::vector<std::int32_t>> PieceLabels::small() const {
+  std::vector<std::vector<std::int32_t>> out;
+  out.reserve(small_.size());
+  for (const auto& [number, cells] : small_) out.push_back(cells);
+  return out;
 }
 
 void PieceLabels::forget_changes() {

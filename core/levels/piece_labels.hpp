@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "core/base/array.hpp"
@@ -27,9 +28,13 @@ class PieceLabels {
   std::size_t count() const { return count_; }
   /// Per cell of level 0, numbered from 0 by their first cell. Linear time.
   std::vector<std::int32_t> by_first_cell() const;
+  /// The cells, ascending, of each piece that has at most kSmall. In an order that depends on what
+  /// was cut when.
+  std::vector<std::vector<std::int32_t>> small() const;
+  static constexpr std::int32_t kSmall = 8;
   /// No blade is to come: gives back what only changes ask for.
   void forget_changes();
-  std::size_t bytes() const { return bytes_of(piece_) + bytes_of(owner_); }
+  std::size_t bytes() const { return bytes_of(piece_) + bytes_of(owner_) + bytes_of(sizes_); }
 
  private:
   /// A part of a piece, as far as it has grown.
@@ -47,11 +52,14 @@ class PieceLabels {
   std::int32_t find(std::int32_t part) const;
   void grow_until_known(const Level& finest);
   void give_number(const Part& part);
+  void list_small(std::int32_t cell, const Level& finest);
 
   std::size_t cells_ = 0;
   std::vector<std::int32_t> piece_;  // per cell, but empty where there is one piece for ever;
                                      // numbers are never used again
   std::size_t count_ = 0;
+  std::vector<std::int32_t> sizes_;                          // cells of each piece
+  std::map<std::int32_t, std::vector<std::int32_t>> small_;  // cells of small pieces
   std::vector<std::int32_t> owner_;  // per cell: part, or -1; of the update under way
   std::vector<Part> parts_;
 };

@@ -25,7 +25,8 @@ void LinearSolver::release() {
     for (const int x : spare_) backend_.release(x);
 }
 
-void LinearSolver::set_structure(const Hierarchy& hierarchy) {
+void LinearSolver::set_structure(const Hierarchy& hierarchy,
+                                 const std::vector<std::vector<std::int32_t>>& small_pieces) {
   const AddTime time(times_.structure);
   hierarchy_ = &hierarchy;
   factor_due_ = true;
@@ -36,7 +37,9 @@ void LinearSolver::set_structure(const Hierarchy& hierarchy) {
     assembled_ = std::make_unique<AssembledLevel>(hierarchy.levels[0]);
     cholesky_ = std::make_unique<SparseCholesky>(CholeskyEngine::supernodal);
     cholesky_->analyse(*assembled_);
+    return;
   }
+  small_.set(hierarchy.levels[0], small_pieces);
 }
 
 void LinearSolver::refresh() {
@@ -52,6 +55,7 @@ void LinearSolver::refresh() {
         "range");
     return;
   }
+  small_.refresh(backend_);
   backend_.prepare(0);
   if (setup_.method == SolverMethod::cg_jacobi) return;
   const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
@@ -113,11 +117,17 @@ SolveStats LinearSolver::run(Problem problem, double tolerance, double reference
   return conjugate_gradients(problem, false);
 }
 
-/// Leaves b - A x; without a product where x is zero.
+/// Solves for small pieces and leaves b - A x; without a product where x is zero elsewhere.
 double LinearSolver::first_residual(const Problem& problem) {
-  if (!problem.from_zero) return true_residual(problem);
-  backend_.copy(0, problem.b, vectors_.residual);
-  return problem.size;
+  const int r = vectors_.residual;
+  if (!problem.from_zero) {
+    if (!small_.empty()) small_.solve(backend_, problem.b, problem.x, r);
+    return true_residual(problem);
+  }
+  backend_.copy(0, problem.b, r);
+  if (small_.empty()) return problem.size;
+  small_.solve(backend_, problem.b, problem.x, r);
+  return std::sqrt(backend_.dot(0, r, r));
 }
 
 double LinearSolver::true_residual(const Problem& problem) {
@@ -219,7 +229,7 @@ SolveStats LinearSolver::direct(const Problem& problem) {
 }
 
 std::size_t LinearSolver::bytes() const {
-  if (!assembled_) return 0;
+  if (!assembled_) return small_.bytes();
   return assembled_->value.capacity() * 12 + cholesky_->factor_entries() * 12;
 }
 

@@ -6,10 +6,12 @@
 #include <array>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "core/backend.hpp"
 #include "core/setup.hpp"
 #include "core/solve/cycle.hpp"
+#include "core/solve/small_pieces.hpp"
 #include "core/solve/sparse_cholesky.hpp"
 
 namespace kerf {
@@ -34,8 +36,10 @@ class LinearSolver {
 
   LinearSolver(Backend& backend, const SolverSetup& setup);
 
-  /// After load(): symbolic work, choice of the cycle.
-  void set_structure(const Hierarchy& hierarchy);
+  /// After load(): symbolic work, choice of the cycle. `small_pieces`: the cells of those that are
+  /// solved for directly, by whatever method the rest is.
+  void set_structure(const Hierarchy& hierarchy,
+                     const std::vector<std::vector<std::int32_t>>& small_pieces = {});
   /// After set_operator() and rotate_cells(): all values that the method needs. The factor of the
   /// coarsest level is kept from the last time while cycles contract as they did with a new one:
   /// the preconditioner is then of slightly older rotations, the solution is not.
@@ -79,6 +83,7 @@ class LinearSolver {
   const Hierarchy* hierarchy_ = nullptr;
   CycleOptions cycle_options_;
   std::unique_ptr<Cycle> cycle_;
+  SmallPieces small_;
   std::unique_ptr<AssembledLevel> assembled_;
   std::unique_ptr<SparseCholesky> cholesky_;
   ConjugateVectors vectors_;  // the residual is the true one, or that of the recursion

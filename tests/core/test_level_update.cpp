@@ -4,6 +4,7 @@
 // how many blades.
 #include <gtest/gtest.h>
 
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -166,6 +167,20 @@ struct Counts {
   int updates = 0, rebuilds = 0;
 };
 
+/// The pieces of at most kSmall cells, whatever their order.
+void expect_small_pieces(const PieceLabels& labels) {
+  std::map<std::int32_t, std::vector<std::int32_t>> cells;
+  const std::vector<std::int32_t> piece = labels.by_first_cell();
+  for (std::size_t c = 0; c < piece.size(); ++c)
+    cells[piece[c]].push_back(static_cast<std::int32_t>(c));
+  std::set<std::vector<std::int32_t>> expected;
+  for (auto& [number, of] : cells)
+    if (of.size() <= PieceLabels::kSmall) expected.insert(std::move(of));
+  const auto small = labels.small();
+  ASSERT_EQ(small.size(), expected.size());
+  ASSERT_EQ((std::set<std::vector<std::int32_t>>(small.begin(), small.end())), expected);
+}
+
 void cut_one_body(std::uint64_t seed, int blades, Counts& counts) {
   test::Dice dice(seed);
   const Voxels voxels = test::random_body(dice);
@@ -207,6 +222,7 @@ void cut_one_body(std::uint64_t seed, int blades, Counts& counts) {
     std::size_t pieces = 0;
     ASSERT_EQ(labels.by_first_cell(), label_pieces(body, &pieces));
     ASSERT_EQ(labels.count(), pieces);
+    expect_small_pieces(labels);
     surface.update(body, event);
     surface.bind(body);
     ASSERT_NO_FATAL_FAILURE(expect_bound_where_they_lie(body, surface));
