@@ -16,7 +16,7 @@ using ConstMatrix = Eigen::Map<const Eigen::MatrixXd>;
 
 /// What a pivot has to keep of its entry. Rounding leaves 1e-16 of one that should be zero; a mass
 /// leaves 1e-9 in a time step of 20 ms, for a millimetre of what is as stiff as bone.
-constexpr double kSingular = 1e-13;
+constexpr double kLeastPivot = 1e-13;
 
 /// Adds the matrix of a cell, packed, to the lower triangle. `place`: of its slots.
 void add_cell(const std::array<double, kernels::kEntries>& packed, const std::array<int, 8>& place,
@@ -74,7 +74,7 @@ void SmallPieces::refresh(const Backend& backend) {
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(matrix);
     const bool is_definite =
         factor.info() == Eigen::Success &&
-        (matrix.diagonal().array().square() > kSingular * diagonal.array()).all();
+        (matrix.diagonal().array().square() > kLeastPivot * diagonal.array()).all();
     if (!is_definite) piece.factor.clear();
   }
 }
