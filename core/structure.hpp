@@ -38,8 +38,12 @@ class Structure {
   /// After a load: gives back what is not read again where no blade is to come.
   void forget_transfers();
   std::size_t pieces() const { return labels_.count(); }
-  /// The cells of those of a few cells.
-  std::vector<std::vector<std::int32_t>> small_pieces() const { return labels_.small(); }
+  /// The cells of those of a few cells; none in static mode, where they are held, and nothing adds
+  /// up over time.
+  std::vector<std::vector<std::int32_t>> small_pieces() const {
+    if (setup_->time.mode == TimeMode::statics) return {};
+    return labels_.small();
+  }
   std::vector<std::int32_t> piece_of_cells() const { return labels_.by_first_cell(); }
   const ExternalForce& external() const { return external_; }
   /// Cells of level 0 with a link to another cell that was cut, ascending.

@@ -181,6 +181,13 @@ void PieceLabels::forget_changes() {
   if (count_ == 1) piece_ = {};
   owner_ = {};
   parts_ = {};
+  sizes_ = {};
+}
+
+std::size_t PieceLabels::bytes() const {
+  std::size_t out = bytes_of(piece_) + bytes_of(owner_) + bytes_of(sizes_);
+  for (const auto& [number, cells] : small_) out += sizeof(number) + bytes_of(cells);
+  return out;
 }
 
 std::vector<std::int32_t> PieceLabels::by_first_cell() const {

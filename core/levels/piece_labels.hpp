@@ -31,10 +31,10 @@ class PieceLabels {
   /// The cells, ascending, of each piece that has at most kSmall. In an order that depends on what
   /// was cut when.
   std::vector<std::vector<std::int32_t>> small() const;
-  static constexpr std::int32_t kSmall = 8;
+  static constexpr std::int32_t kSmall = 4;
   /// No blade is to come: gives back what only changes ask for.
   void forget_changes();
-  std::size_t bytes() const { return bytes_of(piece_) + bytes_of(owner_) + bytes_of(sizes_); }
+  std::size_t bytes() const;
 
  private:
   /// A part of a piece, as far as it has grown.

@@ -121,12 +121,13 @@ SolveStats LinearSolver::run(Problem problem, double tolerance, double reference
 double LinearSolver::first_residual(const Problem& problem) {
   const int r = vectors_.residual;
   if (!problem.from_zero) {
-    if (!small_.empty()) small_.solve(backend_, problem.b, problem.x, r);
+    if (!small_.empty()) small_.solve(backend_, problem.b, problem.x);
     return true_residual(problem);
   }
   backend_.copy(0, problem.b, r);
   if (small_.empty()) return problem.size;
-  small_.solve(backend_, problem.b, problem.x, r);
+  small_.solve(backend_, problem.b, problem.x);
+  small_.clear(backend_, r);
   return std::sqrt(backend_.dot(0, r, r));
 }
 
@@ -143,6 +144,8 @@ void LinearSolver::precondition(bool jacobi) {
   }
   backend_.zero(0, kSolution);
   cycle_->run();
+  // Coarse cells that merge pieces would move those that are solved for.
+  if (!setup_.duplicate_cells && !small_.empty()) small_.clear(backend_, kSolution);
 }
 
 // Flexible conjugate gradients: beta from the change of the residual (Polak, Ribiere), because the

@@ -14,9 +14,10 @@ namespace {
 using Matrix = Eigen::Map<Eigen::MatrixXd>;
 using ConstMatrix = Eigen::Map<const Eigen::MatrixXd>;
 
-/// What a pivot has to keep of its entry. Rounding leaves 1e-16 of one that should be zero; a mass
-/// leaves 1e-9 in a time step of 20 ms, for a millimetre of what is as stiff as bone.
-constexpr double kLeastPivot = 1e-13;
+/// What a pivot has to keep of its entry. Of one that should be zero rounding leaves 1e-15 to 3e-12
+/// (a row of eight cells); a mass leaves more than 1e-10 in a time step of 20 ms, for a millimetre
+/// of what is as stiff as bone.
+constexpr double kLeastPivot = 1e-11;
 
 /// Adds the matrix of a cell, packed, to the lower triangle. `place`: of its slots.
 void add_cell(const std::array<double, kernels::kEntries>& packed, const std::array<int, 8>& place,
@@ -79,11 +80,20 @@ void SmallPieces::refresh(const Backend& backend) {
   }
 }
 
-void SmallPieces::solve(Backend& backend, int b, int x, int r) const {
-  std::vector<std::int32_t> vertices;
+std::vector<std::int32_t> SmallPieces::solved_vertices() const {
+  std::vector<std::int32_t> out;
   for (const Piece& piece : pieces_)
-    if (!piece.factor.empty())
-      vertices.insert(vertices.end(), piece.vertices.begin(), piece.vertices.end());
+    if (!piece.factor.empty()) out.insert(out.end(), piece.vertices.begin(), piece.vertices.end());
+  return out;
+}
+
+void SmallPieces::clear(Backend& backend, int x) const {
+  const std::vector<std::int32_t> vertices = solved_vertices();
+  backend.write_some(0, x, vertices, std::vector<double>(3 * vertices.size()));
+}
+
+void SmallPieces::solve(Backend& backend, int b, int x) const {
+  const std::vector<std::int32_t> vertices = solved_vertices();
   std::vector<double> values(3 * vertices.size());
   backend.read_some(0, b, vertices, values);
   double* at = values.data();
@@ -97,8 +107,6 @@ void SmallPieces::solve(Backend& backend, int b, int x, int r) const {
     at += n;
   }
   backend.write_some(0, x, vertices, values);
-  std::fill(values.begin(), values.end(), 0.0);
-  backend.write_some(0, r, vertices, values);
 }
 
 std::size_t SmallPieces::bytes() const {

@@ -5,7 +5,8 @@
 // A tolerance relative to the whole body is nothing to a crumb: an error of 1e-4 of all forces is a
 // few per cent of its weight, every step, and a piece that nothing holds turns it into spin. Nor do
 // cycles serve it well: it is a corner of ever larger coarse cells, which extrapolate it. So its
-// part of the solution, with which no other piece has to do, comes from a factor of its own.
+// part of the solution, with which no other piece has to do on level 0, comes from a factor of its
+// own.
 #pragma once
 
 #include <cstddef>
@@ -27,8 +28,10 @@ class SmallPieces {
   void refresh(const Backend& backend);
 
   bool empty() const { return pieces_.empty(); }
-  /// Of the vertices of these pieces: x = A^-1 b, and r = 0.
-  void solve(Backend& backend, int b, int x, int r) const;
+  /// x = A^-1 b at the vertices of these pieces, as far as they have factors.
+  void solve(Backend& backend, int b, int x) const;
+  /// x = 0 there.
+  void clear(Backend& backend, int x) const;
   std::size_t bytes() const;
 
  private:
@@ -37,6 +40,8 @@ class SmallPieces {
     std::vector<std::int32_t> vertices;  // ascending
     std::vector<double> factor;          // n by n, its lower triangle by columns; empty: none
   };
+
+  std::vector<std::int32_t> solved_vertices() const;
 
   const Level* finest_ = nullptr;
   std::vector<Piece> pieces_;
