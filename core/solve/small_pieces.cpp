@@ -23,12 +23,11 @@ constexpr double kLeastPivot = 1e-11;
 void add_cell(const std::array<double, kernels::kEntries>& packed, const std::array<int, 8>& place,
               Matrix& to) {
   for (int p = 0; p < 24; ++p)
-    for (int q = 0; q < 24; ++q) {
+    for (int q = 0; q <= p; ++q) {
       const int row = 3 * place[static_cast<std::size_t>(p / 3)] + p % 3;
       const int column = 3 * place[static_cast<std::size_t>(q / 3)] + q % 3;
-      if (row >= column)
-        to(row, column) +=
-            packed[static_cast<std::size_t>(kernels::packed_index(std::max(p, q), std::min(p, q)))];
+      to(std::max(row, column), std::min(row, column)) +=
+          packed[static_cast<std::size_t>(kernels::packed_index(p, q))];
     }
 }
 
