@@ -5,10 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "core/levels/union_find.hpp"
+
 namespace kerf::cpu {
 namespace {
 
 constexpr std::size_t kLeaf = 8;  // vertices that are not divided
+constexpr double kWorth = 0.8;    // power of the smaller part that pays for what lies between
 
 /// Whether a vertex takes no part: its row is that of the identity.
 bool is_held(const Level& level, int vertex) { return level.fixed[vertex] == 7; }
@@ -18,10 +21,19 @@ class Dissection {
   Dissection(const Level& level, const AssembledLevel& matrix, std::vector<Front>& out)
       : level_(level), matrix_(matrix), out_(out), inside_(level.point.size(), 0) {
     least_.resize(inside_.size());
+    place_.resize(inside_.size());
   }
 
+  /// What a cut has parted may lie at the same places on both sides, which no plane parts.
   void divide(std::vector<int> vertices) {
-    if (vertices.empty()) return;
+    if (vertices.size() <= kLeaf) return add(std::move(vertices));
+    std::vector<std::vector<int>> parts = separate(vertices);
+    if (parts.empty()) return divide_connected(std::move(vertices));
+    for (std::vector<int>& part : parts) divide_connected(std::move(part));
+  }
+
+ private:
+  void divide_connected(std::vector<int> vertices) {
     std::vector<int> low, high, between;
     if (vertices.size() > kLeaf) split(vertices, low, high, between);
     if (low.empty() || high.empty()) return add(std::move(vertices));
@@ -30,7 +42,40 @@ class Dissection {
     add(std::move(between));
   }
 
- private:
+  /// body(v, w) for vertices of a list that touch, each pair once.
+  template <class Body>
+  void for_touching(const std::vector<int>& vertices, const Body& body) {
+    for (const int v : vertices) inside_[v] = 1;
+    for (const int v : vertices)
+      for (int k = matrix_.column_begin[3 * v]; k < matrix_.column_begin[3 * v + 1]; k += 3) {
+        const int w = matrix_.row[k] / 3;
+        if (inside_[w] != 0) body(v, w);
+      }
+    for (const int v : vertices) inside_[v] = 0;
+  }
+
+  /// Parts that do not touch each other, each in the order of the list; none for one part alone.
+  std::vector<std::vector<int>> separate(const std::vector<int>& vertices) {
+    const auto count = static_cast<std::int32_t>(vertices.size());
+    for (std::int32_t i = 0; i < count; ++i) place_[vertices[i]] = i;
+    UnionFind sets(vertices.size());
+    std::int32_t unions = 0;
+    for_touching(vertices,
+                 [&](int v, int w) { unions += sets.unite(place_[v], place_[w]) ? 1 : 0; });
+    std::vector<std::vector<int>> parts;
+    if (unions == count - 1) return parts;
+    std::vector<int> part_of(vertices.size());  // of representatives, which come first
+    for (std::int32_t i = 0; i < count; ++i) {
+      const std::int32_t first = sets.find(i);
+      if (first == i) {
+        part_of[i] = static_cast<int>(parts.size());
+        parts.emplace_back();
+      }
+      parts[part_of[first]].push_back(vertices[i]);
+    }
+    return parts;
+  }
+
   int at(int vertex, std::size_t axis) const { return level_.point[vertex][axis]; }
 
   struct Plane {
@@ -52,18 +97,14 @@ class Dissection {
 
   /// Of each vertex, the least place of those that it touches.
   void find_least(std::size_t axis, const std::vector<int>& vertices) {
-    for (const int v : vertices) inside_[v] = 1, least_[v] = at(v, axis);
-    for (const int v : vertices)
-      for (int k = matrix_.column_begin[3 * v]; k < matrix_.column_begin[3 * v + 1]; k += 3) {
-        const int w = matrix_.row[k] / 3;
-        if (inside_[w] == 0) continue;
-        least_[v] = std::min(least_[v], at(w, axis));
-        least_[w] = std::min(least_[w], at(v, axis));
-      }
-    for (const int v : vertices) inside_[v] = 0;
+    for (const int v : vertices) least_[v] = at(v, axis);
+    for_touching(vertices, [&](int v, int w) {
+      least_[v] = std::min(least_[v], at(w, axis));
+      least_[w] = std::min(least_[w], at(v, axis));
+    });
   }
 
-  /// The fewest between, for what they divide.
+  /// The fewest between, for what they divide: measured, docs/decisions/0014-fronts.md.
   void look_along(std::size_t axis, const std::vector<int>& vertices, Plane& best) {
     find_least(axis, vertices);
     int first = INT32_MAX, last = INT32_MIN;
@@ -85,7 +126,7 @@ class Dissection {
       const int upper = static_cast<int>(vertices.size()) - lower - middle;
       if (lower == 0 || upper <= 0) continue;
       // One more, so that of planes with none between the one nearest to the middle wins.
-      const double cost = (middle + 1.0) / std::min(lower, upper);
+      const double cost = (middle + 1.0) / std::pow(std::min(lower, upper), kWorth);
       if (cost < best.cost) best = {axis, first + static_cast<int>(p), cost};
     }
   }
@@ -101,7 +142,7 @@ class Dissection {
   const AssembledLevel& matrix_;
   std::vector<Front>& out_;
   std::vector<char> inside_;
-  std::vector<int> least_;
+  std::vector<int> least_, place_;
 };
 
 /// Rows of all fronts, and where they are in the front above.

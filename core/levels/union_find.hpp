@@ -25,12 +25,14 @@ class UnionFind {
     return i;
   }
 
-  void unite(std::int32_t a, std::int32_t b) {
+  /// @returns whether they were apart.
+  bool unite(std::int32_t a, std::int32_t b) {
     a = find(a);
     b = find(b);
-    if (a == b) return;
+    if (a == b) return false;
     if (b < a) std::swap(a, b);
     parent_[b] = a;
+    return true;
   }
 
  private:

@@ -133,18 +133,47 @@ TEST(Fronts, SolveAsASparseFactorDoes) {
   }
 }
 
-TEST(Fronts, SolveSeparatePieces) {
-  LinkedOctree body(test::box_body({16, 16, 16}), 0);
-  for (int z = 0; z < 16; ++z)  // 64 pieces
-    for (int y = 0; y < 16; ++y)
-      for (int x = 0; x < 16; ++x)
+/// A cube, as wide as `cells`, in cubes of its own.
+Problem diced(int cells, int width) {
+  LinkedOctree body(test::box_body({cells, cells, cells}), 0);
+  for (int z = 0; z < cells; ++z)
+    for (int y = 0; y < cells; ++y)
+      for (int x = 0; x < cells; ++x)
         for (int axis = 0; axis < 3; ++axis)
-          if (const Vec3i at{x, y, z}; at[axis] % 4 == 3 && at[axis] < 15)
+          if (const Vec3i at{x, y, z}; at[axis] % width == width - 1 && at[axis] < cells - 1)
             test::disconnect(body, at, axis);
   ProblemOptions options;
   options.max_levels = 1;
   options.with_oracle = false;
-  const Problem p(std::move(body), options);
+  return Problem(std::move(body), options);
+}
+
+// Vertices of several pieces lie at one place, so that no plane parts them.
+TEST(Fronts, HaveOnePieceEach) {
+  for (const auto& [cells, width] : {std::pair{8, 1}, {8, 2}, {12, 3}}) {
+    SCOPED_TRACE(::testing::Message() << cells << " cells, pieces of " << width);
+    const Problem p = diced(cells, width);
+    const Level& level = p.hierarchy.levels[0];
+    const cpu::Fronts fronts(level, AssembledLevel(level));
+    std::vector<int> piece(level.point.size());
+    for (std::int32_t c = 0; c < level.cells(); ++c)
+      for (const std::int32_t v : level.slots[c]) {
+        piece[v] = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          piece[v] = cells * piece[v] + level.corner[c][axis] / width;
+      }
+    std::size_t most = 0;
+    for (const cpu::Front& front : fronts.all) {
+      most = std::max(most, front.vertices.size() + front.rows.size());
+      for (const int v : front.vertices) EXPECT_EQ(piece[v], piece[front.vertices[0]]);
+      for (const int v : front.rows) EXPECT_EQ(piece[v], piece[front.vertices[0]]);
+    }
+    EXPECT_LE(most, std::pow(width + 1, 3));
+  }
+}
+
+TEST(Fronts, SolveSeparatePieces) {
+  const Problem p = diced(16, 4);  // 64 pieces
   const Level& level = p.hierarchy.levels[0];
   const AssembledLevel matrix = noisy(level, 20);
   const cpu::Fronts fronts(level, matrix);
