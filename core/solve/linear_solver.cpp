@@ -59,27 +59,38 @@ void LinearSolver::refresh() {
   backend_.prepare(0);
   if (setup_.method == SolverMethod::cg_jacobi) return;
   const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
-  const bool factors = factor_due_ || !backend_.has_factor();
-  for (int level = 0; level < last; ++level) {
-    if (level + 1 == last && !factors) break;  // its matrices serve the factor alone
+  for (int level = 0; level + 1 < last; ++level) {
     backend_.coarsen(level);
-    if (level + 1 < last) backend_.prepare(level + 1);
+    backend_.prepare(level + 1);
   }
-  if (!factors) return;
-  backend_.factor_coarsest();
-  ++factors_;
-  factor_due_ = false;
-  decades_with_new_ = 0;
+  factor_is_new_ = false;
+  if (factor_due_ || !backend_.has_factor()) renew_factor();
 }
 
-// With a factor of older rotations the coarsest correction is off, and cycles contract less.
-void LinearSolver::watch_factor(const SolveStats& stats, double before) {
+/// The factor of the coarsest level, of the values of now; false if it is. The matrices of that
+/// level serve the factor alone.
+bool LinearSolver::renew_factor() {
+  if (factor_is_new_) return false;
+  const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
+  if (last > 0) backend_.coarsen(last - 1);
+  backend_.factor_coarsest();
+  ++factors_;
+  factor_is_new_ = true;
+  factor_due_ = false;
+  decades_with_new_ = 0;
+  return true;
+}
+
+// With a factor of older rotations the coarsest correction is off, and cycles contract less. Where
+// it has more than twice the length that it should have, they do not contract at all.
+void LinearSolver::watch_factor(const SolveStats& stats, const Watch& since) {
   constexpr double kWorthIt = 0.85;  // a factor costs as much as some cycles
-  if (stats.cycles == 0 || !(stats.residual > 0) || !(before > stats.residual)) {
+  const int cycles = stats.cycles - since.cycles;
+  if (cycles == 0 || !(stats.residual > 0) || !(since.residual > stats.residual)) {
     factor_due_ = factor_due_ || !stats.converged;
     return;
   }
-  const double decades = std::log10(before / stats.residual) / stats.cycles;
+  const double decades = std::log10(since.residual / stats.residual) / cycles;
   if (decades_with_new_ == 0)
     decades_with_new_ = decades;
   else if (decades < kWorthIt * decades_with_new_ || !stats.converged)
@@ -161,7 +172,7 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
   const double goal = fixed ? 0 : problem.goal;
   SolveStats stats;
   double norm = first_residual(problem);
-  const double before = norm / problem.reference;
+  Watch watch{norm / problem.reference, 0};
   ConjugateState state;
   for (int retries = 0; norm > goal && stats.cycles < limit && retries <= kRetries;) {
     const double at_start = norm;
@@ -183,12 +194,21 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
     const bool was_at_goal = norm <= goal;
     norm = true_residual(problem);
     if (lost) state = {};  // the next start has no direction
-    if (lost || (!fixed && (was_at_goal || !(norm < at_start)))) ++retries;
+    if (lost && !jacobi && renew_factor())
+      watch = {norm / problem.reference, stats.cycles};
+    else if (lost || (!fixed && (was_at_goal || !(norm < at_start))))
+      ++retries;
   }
   stats.residual = norm / problem.reference;
   stats.converged = fixed || norm <= goal * (1 + 1e-12);
-  if (!jacobi) watch_factor(stats, before);
+  if (!jacobi) watch_factor(stats, watch);
   return stats;
+}
+
+/// Of one cycle, beside what those with a new factor did on the mean.
+bool LinearSolver::is_slow(double before, double after) const {
+  constexpr double kPart = 0.5;  // first cycles contract more than later ones
+  return !(after < before) || std::log10(before / after) < kPart * decades_with_new_;
 }
 
 SolveStats LinearSolver::multigrid(const Problem& problem) {
@@ -196,17 +216,25 @@ SolveStats LinearSolver::multigrid(const Problem& problem) {
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
   double norm = first_residual(problem);
-  const double before = norm / problem.reference;
+  Watch watch{norm / problem.reference, 0};
   while (stats.cycles < limit && (fixed || norm > problem.goal)) {
     precondition(false);
     backend_.add(0, 1, kSolution, problem.x);
-    norm = true_residual(problem);
+    double left = true_residual(problem);
     ++stats.cycles;
+    if (is_slow(norm, left) && renew_factor()) {
+      if (!(left < norm)) {
+        backend_.add(0, -1, kSolution, problem.x);
+        left = true_residual(problem);
+      }
+      watch = {left / problem.reference, stats.cycles};
+    }
+    norm = left;
     if (progress_) progress_(stats.cycles, norm / problem.reference);
   }
   stats.residual = norm / problem.reference;
   stats.converged = fixed || norm <= problem.goal;
-  watch_factor(stats, before);
+  watch_factor(stats, watch);
   return stats;
 }
 

@@ -42,7 +42,8 @@ class LinearSolver {
                      const std::vector<std::vector<std::int32_t>>& small_pieces = {});
   /// After set_operator() and rotate_cells(): all values that the method needs. The factor of the
   /// coarsest level is kept from the last time while cycles contract as they did with a new one:
-  /// the preconditioner is then of slightly older rotations, the solution is not.
+  /// the preconditioner is then of slightly older rotations, the solution is not. A solve that it
+  /// fails makes a new one on its way.
   void refresh();
   /// Improves x until |b - A x| <= tolerance * reference, or by a fixed number of cycles.
   /// `reference` 0: |b|. b and x must be vectors of their own, not those of VectorId.
@@ -76,7 +77,14 @@ class LinearSolver {
   double true_residual(const Problem& problem);
   void precondition(bool jacobi);
 
-  void watch_factor(const SolveStats& stats, double before);
+  /// From where on a solve has had the factor that it has.
+  struct Watch {
+    double residual;
+    int cycles;
+  };
+  bool renew_factor();
+  void watch_factor(const SolveStats& stats, const Watch& since);
+  bool is_slow(double before, double after) const;
 
   Backend& backend_;
   SolverSetup setup_;
@@ -89,6 +97,7 @@ class LinearSolver {
   ConjugateVectors vectors_;  // the residual is the true one, or that of the recursion
   std::array<int, 2> spare_;
   bool factor_due_ = true;
+  bool factor_is_new_ = false;  // of the values that cycles have
   int factors_ = 0;
   double decades_with_new_ = 0;  // a cycle, of the first solve after it
   SolverTimes times_;
