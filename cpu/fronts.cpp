@@ -104,7 +104,7 @@ class Dissection {
     });
   }
 
-  /// The fewest between, for what they divide: measured, docs/decisions/0014-fronts.md.
+  /// The fewest between, for what they divide: measured, docs/decisions/0030-old-factors.md.
   void look_along(std::size_t axis, const std::vector<int>& vertices, Plane& best) {
     find_least(axis, vertices);
     int first = INT32_MAX, last = INT32_MIN;

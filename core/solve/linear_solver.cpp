@@ -9,6 +9,14 @@
 #include "core/base/timer.hpp"
 
 namespace kerf {
+namespace {
+
+/// Whether residuals fell by less than so many decades.
+bool is_slow(double before, double after, double decades) {
+  return !(after < before) || std::log10(before / after) < decades;
+}
+
+}  // namespace
 
 LinearSolver::LinearSolver(Backend& backend, const SolverSetup& setup)
     : backend_(backend),
@@ -64,7 +72,7 @@ void LinearSolver::refresh() {
     backend_.prepare(level + 1);
   }
   factor_is_new_ = false;
-  if (factor_due_ || !backend_.has_factor()) renew_factor();
+  if ((factor_due_ || !backend_.has_factor()) && renew_factor()) decades_with_new_ = 0;
 }
 
 /// The factor of the coarsest level, of the values of now; false if it is. The matrices of that
@@ -77,7 +85,6 @@ bool LinearSolver::renew_factor() {
   ++factors_;
   factor_is_new_ = true;
   factor_due_ = false;
-  decades_with_new_ = 0;
   return true;
 }
 
@@ -86,8 +93,10 @@ bool LinearSolver::renew_factor() {
 void LinearSolver::watch_factor(const SolveStats& stats, const Watch& since) {
   constexpr double kWorthIt = 0.85;  // a factor costs as much as some cycles
   const int cycles = stats.cycles - since.cycles;
-  if (cycles == 0 || !(stats.residual > 0) || !(since.residual > stats.residual)) {
-    factor_due_ = factor_due_ || !stats.converged;
+  // One that failed was older than the last solve: the next one is likely to fail as well.
+  if (since.cycles > 0 || cycles == 0 || !(stats.residual > 0) ||
+      !(since.residual > stats.residual)) {
+    factor_due_ = factor_due_ || since.cycles > 0 || !stats.converged;
     return;
   }
   const double decades = std::log10(since.residual / stats.residual) / cycles;
@@ -166,6 +175,8 @@ void LinearSolver::precondition(bool jacobi) {
 SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi) {
   constexpr double kDigits = 1e-5;  // that single precision is trusted with
   constexpr int kRetries = 2;       // where the recursion was at the goal, and the residual is not
+  constexpr int kPatience = 5;      // first steps may lower the error alone
+  constexpr double kPart = 0.4;     // of what cycles with a new factor did: a newer one pays
   const bool fixed = setup_.cycles > 0;
   const std::int64_t limit =
       fixed ? setup_.cycles : (jacobi ? std::int64_t{50} : std::int64_t{1}) * setup_.max_cycles;
@@ -190,6 +201,11 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
       greatest = std::max(greatest, norm);
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / problem.reference);
+      const int since = stats.cycles - watch.cycles;
+      if (!jacobi && since >= kPatience && !enough() &&
+          is_slow(watch.residual * problem.reference, norm, kPart * since * decades_with_new_) &&
+          renew_factor())
+        watch = {norm / problem.reference, stats.cycles};
     }
     const bool was_at_goal = norm <= goal;
     norm = true_residual(problem);
@@ -205,13 +221,8 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
   return stats;
 }
 
-/// Of one cycle, beside what those with a new factor did on the mean.
-bool LinearSolver::is_slow(double before, double after) const {
-  constexpr double kPart = 0.5;  // first cycles contract more than later ones
-  return !(after < before) || std::log10(before / after) < kPart * decades_with_new_;
-}
-
 SolveStats LinearSolver::multigrid(const Problem& problem) {
+  constexpr double kPart = 0.5;  // of what cycles with a new factor did, the first ones most
   const bool fixed = setup_.cycles > 0;
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
@@ -222,7 +233,7 @@ SolveStats LinearSolver::multigrid(const Problem& problem) {
     backend_.add(0, 1, kSolution, problem.x);
     double left = true_residual(problem);
     ++stats.cycles;
-    if (is_slow(norm, left) && renew_factor()) {
+    if (is_slow(norm, left, kPart * decades_with_new_) && renew_factor()) {
       if (!(left < norm)) {
         backend_.add(0, -1, kSolution, problem.x);
         left = true_residual(problem);

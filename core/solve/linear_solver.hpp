@@ -84,7 +84,6 @@ class LinearSolver {
   };
   bool renew_factor();
   void watch_factor(const SolveStats& stats, const Watch& since);
-  bool is_slow(double before, double after) const;
 
   Backend& backend_;
   SolverSetup setup_;
@@ -99,7 +98,7 @@ class LinearSolver {
   bool factor_due_ = true;
   bool factor_is_new_ = false;  // of the values that cycles have
   int factors_ = 0;
-  double decades_with_new_ = 0;  // a cycle, of the first solve after it
+  double decades_with_new_ = 0;  // a cycle, of the first solve with one of refresh()
   SolverTimes times_;
   Progress progress_;
 };

@@ -190,6 +190,49 @@ TEST(Solver, AutomaticCycleSolvesLevelOneOnceWhereItIsLarge) {
   }
 }
 
+// A body at rest, then twisted: corrections by the factor of the first are too long for the second,
+// so that cycles alone may grow, and W is no longer positive definite.
+TEST(Solver, AFactorOfOtherRotationsIsMadeAnewWhereItFails) {
+  ProblemOptions options = Case::static_options();
+  options.materials = 1;
+  options.with_oracle = false;
+  options.coarsest_vertices = 300;
+  const Problem p(LinkedOctree(test::box_body({24, 8, 8}), 0), options);
+  const Level& level = p.hierarchy.levels[0];
+  const auto twisted_by = [&](double radians) {
+    std::vector<double> q;
+    for (std::int32_t c = 0; c < level.cells(); ++c) {
+      const double half = 0.5 * radians * level.corner[c][0] / 24;
+      for (const double x : {std::cos(half), std::sin(half), 0.0, 0.0}) q.push_back(x);
+    }
+    return q;
+  };
+  for (const char* machine : {"cpu", "fast", "mixed"})
+    for (const SolverMethod method : {SolverMethod::cg, SolverMethod::multigrid})
+      for (const CycleType cycle : {CycleType::v, CycleType::w, CycleType::k}) {
+        SCOPED_TRACE(::testing::Message() << machine << ", method " << static_cast<int>(method)
+                                          << ", cycle " << static_cast<int>(cycle));
+        const std::unique_ptr<Backend> backend = test::make_backend(machine);
+        LinearSolver solver(*backend, setup_of(method, cycle));
+        const int b = backend->add_vector(), x = backend->add_vector();
+        backend->load(p.hierarchy);
+        solver.set_structure(p.hierarchy);
+        backend->set_operator(kStatic);
+        for (const double radians : {0.0, 3.0}) {
+          backend->write_rotations(twisted_by(radians));
+          solver.refresh();
+          EXPECT_EQ(solver.factors(), 1);
+          test::write(*backend, 0, b, p.free_vector(0, 17));
+          const SolveStats stats = solver.solve_from_zero(b, x, 1e-8);
+          EXPECT_TRUE(stats.converged);
+          EXPECT_LE(stats.residual, 1e-8);
+          EXPECT_EQ(solver.factors(), radians == 0 ? 1 : 2);
+          // 8 to 14 and 8 to 32; with the old factor 23 to 74, or never.
+          EXPECT_LE(stats.cycles, radians == 0 ? 15 : 35);
+        }
+      }
+}
+
 TEST(Solver, FixedNumberOfCyclesIsThatNumber) {
   const Case c("half_cut", kStatic);
   for (const SolverMethod method :
