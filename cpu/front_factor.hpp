@@ -52,8 +52,8 @@ class FrontFactor {
     return good;
   }
 
-  /// In place. Each branch has a copy of x, so that what they add to rows of the trunk meets in
-  /// one order.
+  /// In place. Each branch has a copy of its part of x, so that what they add to rows of the trunk
+  /// meets in one order.
   void solve(std::span<double> x, int threads) {
     constexpr std::size_t kWorthEntries = 65536;  // below, waking the threads costs more
     if (fronts_.entries < kWorthEntries) threads = 1;
@@ -71,7 +71,9 @@ class FrontFactor {
                 });
     };
     each_branch([&](const std::vector<int>& branch, double* local) {
-      std::copy_n(whole, 4 * vertices, local);
+      for (const int f : branch)
+        for (const int v : fronts_.all[f].vertices)
+          store_pack(local + 4 * v, four_at(whole + 4 * v));
       for_trunk([&](std::size_t i) { store_pack(local + i, P(0)); });
       for (const int f : branch) go_forward(fronts_.all[f], local);
     });

@@ -11,7 +11,6 @@ namespace kerf::cpu {
 namespace {
 
 constexpr std::size_t kLeaf = 8;  // vertices that are not divided
-constexpr double kWorth = 0.8;    // power of the smaller part that pays for what lies between
 
 /// Whether a vertex takes no part: its row is that of the identity.
 bool is_held(const Level& level, int vertex) { return level.fixed[vertex] == 7; }
@@ -24,7 +23,8 @@ class Dissection {
     place_.resize(inside_.size());
   }
 
-  /// What a cut has parted may lie at the same places on both sides, which no plane parts.
+  /// What a cut has parted may lie at the same places on both sides, which no plane parts. A few
+  /// vertices are one front in any case.
   void divide(std::vector<int> vertices) {
     if (vertices.size() <= kLeaf) return add(std::move(vertices));
     std::vector<std::vector<int>> parts = separate(vertices);
@@ -104,7 +104,8 @@ class Dissection {
     });
   }
 
-  /// The fewest between, for what they divide: measured, docs/decisions/0030-old-factors.md.
+  /// The fewest between, to the power of 5 over the smaller part to the power of 4: measured,
+  /// docs/decisions/0030-old-factors.md.
   void look_along(std::size_t axis, const std::vector<int>& vertices, Plane& best) {
     find_least(axis, vertices);
     int first = INT32_MAX, last = INT32_MIN;
@@ -125,8 +126,11 @@ class Dissection {
       middle += between[p];
       const int upper = static_cast<int>(vertices.size()) - lower - middle;
       if (lower == 0 || upper <= 0) continue;
-      // One more, so that of planes with none between the one nearest to the middle wins.
-      const double cost = (middle + 1.0) / std::pow(std::min(lower, upper), kWorth);
+      // One more, so that of planes with none between the one nearest to the middle wins. Only
+      // products, which round the same everywhere: no std::pow.
+      const double between_up = middle + 1.0, part = std::min(lower, upper);
+      const double square = between_up * between_up, part2 = part * part;
+      const double cost = square * square * between_up / (part2 * part2);
       if (cost < best.cost) best = {axis, first + static_cast<int>(p), cost};
     }
   }

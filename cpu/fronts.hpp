@@ -2,7 +2,7 @@
 //
 // The structure of a sparse Cholesky factor in dense pieces: fronts, for the coarsest level.
 //
-// Vertices that do not touch each other, by whatever way, are parted first. Then by a plane, the
+// Vertices that are not connected are parted first, then those that are by a plane, the
 // one with the fewest vertices between for what it parts; those on the far side that touch the near
 // one lie between. So on with all parts. What is left in the end, and what lies between, is a
 // front: its columns are eliminated together, from a dense matrix over them and over the rows below

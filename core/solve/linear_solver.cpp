@@ -11,10 +11,8 @@
 namespace kerf {
 namespace {
 
-/// Whether residuals fell by less than so many decades.
-bool is_slow(double before, double after, double decades) {
-  return !(after < before) || std::log10(before / after) < decades;
-}
+/// Steps of conjugate gradients that are judged together: single ones may lower the error alone.
+constexpr int kPatience = 5;
 
 }  // namespace
 
@@ -72,7 +70,9 @@ void LinearSolver::refresh() {
     backend_.prepare(level + 1);
   }
   factor_is_new_ = false;
-  if ((factor_due_ || !backend_.has_factor()) && renew_factor()) decades_with_new_ = 0;
+  if (!factor_due_ && backend_.has_factor()) return;
+  renew_factor();
+  decades_with_new_ = 0;
 }
 
 /// The factor of the coarsest level, of the values of now; false if it is. The matrices of that
@@ -93,17 +93,23 @@ bool LinearSolver::renew_factor() {
 void LinearSolver::watch_factor(const SolveStats& stats, const Watch& since) {
   constexpr double kWorthIt = 0.85;  // a factor costs as much as some cycles
   const int cycles = stats.cycles - since.cycles;
-  // One that failed was older than the last solve: the next one is likely to fail as well.
-  if (since.cycles > 0 || cycles == 0 || !(stats.residual > 0) ||
-      !(since.residual > stats.residual)) {
-    factor_due_ = factor_due_ || since.cycles > 0 || !stats.converged;
-    return;
-  }
-  const double decades = std::log10(since.residual / stats.residual) / cycles;
-  if (decades_with_new_ == 0)
-    decades_with_new_ = decades;
-  else if (decades < kWorthIt * decades_with_new_ || !stats.converged)
-    factor_due_ = true;
+  const bool falls = cycles > 0 && stats.residual > 0 && since.residual > stats.residual;
+  const double decades = falls ? std::log10(since.residual / stats.residual) / cycles : 0;
+  if (decades_with_new_ == 0 && factor_is_new_) decades_with_new_ = decades;
+  // The next update may turn as far as this one did. Cycles alone find that out at once, conjugate
+  // gradients not before kPatience steps.
+  const bool was_late = since.renewed && setup_.method == SolverMethod::cg;
+  const bool is_slower = !since.renewed && falls && decades < kWorthIt * decades_with_new_;
+  factor_due_ = factor_due_ || was_late || is_slower || !stats.converged;
+}
+
+/// Whether the residual falls by less than `part` of what it does with a new factor on the mean;
+/// where that is not known, whether there were many cycles.
+bool LinearSolver::is_slow(const Watch& from, const Watch& to, double part) const {
+  if (!(to.residual < from.residual)) return true;
+  if (decades_with_new_ == 0) return to.cycles >= kPatience;
+  const double decades = std::log10(from.residual / to.residual);
+  return decades < part * (to.cycles - from.cycles) * decades_with_new_;
 }
 
 SolveStats LinearSolver::solve(int b, int x, double tolerance, double reference) {
@@ -175,24 +181,24 @@ void LinearSolver::precondition(bool jacobi) {
 SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi) {
   constexpr double kDigits = 1e-5;  // that single precision is trusted with
   constexpr int kRetries = 2;       // where the recursion was at the goal, and the residual is not
-  constexpr int kPatience = 5;      // first steps may lower the error alone
-  constexpr double kPart = 0.4;     // of what cycles with a new factor did: a newer one pays
+  constexpr double kPart = 0.4;     // half or more is usual, whatever the factor is
   const bool fixed = setup_.cycles > 0;
   const std::int64_t limit =
       fixed ? setup_.cycles : (jacobi ? std::int64_t{50} : std::int64_t{1}) * setup_.max_cycles;
   const double goal = fixed ? 0 : problem.goal;
   SolveStats stats;
   double norm = first_residual(problem);
-  Watch watch{norm / problem.reference, 0};
+  Watch watch{norm / problem.reference, 0, false}, window = watch;
   ConjugateState state;
-  for (int retries = 0; norm > goal && stats.cycles < limit && retries <= kRetries;) {
+  const auto has_more = [&] { return stats.cycles < limit; };
+  for (int retries = 0; norm > goal && has_more() && retries <= kRetries;) {
     const double at_start = norm;
     double greatest = norm;
     const auto enough = [&] {
       return norm <= goal || (vectors_.rounded && norm <= kDigits * greatest);
     };
     bool lost = false;
-    while (!enough() && stats.cycles < limit) {
+    while (!enough() && has_more()) {
       precondition(jacobi);
       lost = !backend_.advance_conjugate(kSolution, vectors_.direction, vectors_.product, problem.x,
                                          vectors_.residual, state);
@@ -201,17 +207,16 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
       greatest = std::max(greatest, norm);
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / problem.reference);
-      const int since = stats.cycles - watch.cycles;
-      if (!jacobi && since >= kPatience && !enough() &&
-          is_slow(watch.residual * problem.reference, norm, kPart * since * decades_with_new_) &&
-          renew_factor())
-        watch = {norm / problem.reference, stats.cycles};
+      if (jacobi || stats.cycles - window.cycles < kPatience) continue;
+      const Watch now{norm / problem.reference, stats.cycles, true};
+      if (is_slow(window, now, kPart) && !enough() && has_more() && renew_factor()) watch = now;
+      window = now;
     }
     const bool was_at_goal = norm <= goal;
     norm = true_residual(problem);
     if (lost) state = {};  // the next start has no direction
-    if (lost && !jacobi && renew_factor())
-      watch = {norm / problem.reference, stats.cycles};
+    if (lost && !jacobi && has_more() && renew_factor())
+      watch = window = {norm / problem.reference, stats.cycles, true};
     else if (lost || (!fixed && (was_at_goal || !(norm < at_start))))
       ++retries;
   }
@@ -222,25 +227,27 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
 }
 
 SolveStats LinearSolver::multigrid(const Problem& problem) {
-  constexpr double kPart = 0.5;  // of what cycles with a new factor did, the first ones most
+  constexpr double kPart = 0.5;  // the first cycles of a solve lower the residual most
   const bool fixed = setup_.cycles > 0;
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
   double norm = first_residual(problem);
-  Watch watch{norm / problem.reference, 0};
-  while (stats.cycles < limit && (fixed || norm > problem.goal)) {
+  Watch watch{norm / problem.reference, 0, false};
+  const auto has_more = [&] { return stats.cycles < limit && (fixed || norm > problem.goal); };
+  while (has_more()) {
+    const Watch before{norm / problem.reference, stats.cycles, false};
     precondition(false);
     backend_.add(0, 1, kSolution, problem.x);
-    double left = true_residual(problem);
+    norm = true_residual(problem);
     ++stats.cycles;
-    if (is_slow(norm, left, kPart * decades_with_new_) && renew_factor()) {
-      if (!(left < norm)) {
+    const Watch now{norm / problem.reference, stats.cycles, true};
+    if (is_slow(before, now, kPart) && has_more() && renew_factor()) {
+      if (!(now.residual < before.residual)) {  // x is not far: what rounding leaves is solved for
         backend_.add(0, -1, kSolution, problem.x);
-        left = true_residual(problem);
+        norm = true_residual(problem);
       }
-      watch = {left / problem.reference, stats.cycles};
+      watch = {norm / problem.reference, stats.cycles, true};
     }
-    norm = left;
     if (progress_) progress_(stats.cycles, norm / problem.reference);
   }
   stats.residual = norm / problem.reference;

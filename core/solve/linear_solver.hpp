@@ -77,13 +77,15 @@ class LinearSolver {
   double true_residual(const Problem& problem);
   void precondition(bool jacobi);
 
-  /// From where on a solve has had the factor that it has.
+  /// A place in a solve; renewed: with a factor that was made in it.
   struct Watch {
     double residual;
     int cycles;
+    bool renewed;
   };
   bool renew_factor();
   void watch_factor(const SolveStats& stats, const Watch& since);
+  bool is_slow(const Watch& from, const Watch& to, double part) const;
 
   Backend& backend_;
   SolverSetup setup_;
@@ -98,7 +100,7 @@ class LinearSolver {
   bool factor_due_ = true;
   bool factor_is_new_ = false;  // of the values that cycles have
   int factors_ = 0;
-  double decades_with_new_ = 0;  // a cycle, of the first solve with one of refresh()
+  double decades_with_new_ = 0;  // a cycle, of the first solve with a new one; 0: not known
   SolverTimes times_;
   Progress progress_;
 };
