@@ -42,7 +42,7 @@ class Dissection {
     add(std::move(between));
   }
 
-  /// body(v, w) for vertices of a list that touch, each pair once.
+  /// body(v, w) for vertices of a list that touch, each pair once, and each with itself.
   template <class Body>
   void for_touching(const std::vector<int>& vertices, const Body& body) {
     for (const int v : vertices) inside_[v] = 1;

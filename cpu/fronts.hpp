@@ -2,11 +2,11 @@
 //
 // The structure of a sparse Cholesky factor in dense pieces: fronts, for the coarsest level.
 //
-// Vertices that are not connected are parted first, then those that are by a plane, the
-// one with the fewest vertices between for what it parts; those on the far side that touch the near
-// one lie between. So on with all parts. What is left in the end, and what lies between, is a
-// front: its columns are eliminated together, from a dense matrix over them and over the rows below
-// in which they, or the fronts below them, have entries.
+// Vertices that are not connected are parted first. Connected ones are parted by a plane, the one
+// with the fewest vertices between for what it parts; those on the far side that touch the near one
+// lie between. So on with all parts. What is left in the end, and what lies between, is a front:
+// its columns are eliminated together, from a dense matrix over them and over the rows below in
+// which they, or the fronts below them, have entries.
 //
 // Layout  A front has its columns first, up to a multiple of four, then its rows; all up to a
 //         multiple of eight: `height` places. What is between has ones on the diagonal and zeros

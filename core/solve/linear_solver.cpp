@@ -75,8 +75,8 @@ void LinearSolver::refresh() {
   decades_with_new_ = 0;
 }
 
-/// The factor of the coarsest level, of the values of now; false if it is. The matrices of that
-/// level serve the factor alone.
+/// The factor of the coarsest level, of the values of now; false if it is that already. The
+/// matrices of that level serve the factor alone.
 bool LinearSolver::renew_factor() {
   if (factor_is_new_) return false;
   const int last = static_cast<int>(hierarchy_->levels.size()) - 1;
@@ -90,7 +90,7 @@ bool LinearSolver::renew_factor() {
 
 // With a factor of older rotations the coarsest correction is off, and cycles contract less. Where
 // it has more than twice the length that it should have, they do not contract at all.
-void LinearSolver::watch_factor(const SolveStats& stats, const Watch& since) {
+void LinearSolver::watch_factor(const SolveStats& stats, const Place& since, bool renewed) {
   constexpr double kWorthIt = 0.85;  // a factor costs as much as some cycles
   const int cycles = stats.cycles - since.cycles;
   const bool falls = cycles > 0 && stats.residual > 0 && since.residual > stats.residual;
@@ -98,14 +98,14 @@ void LinearSolver::watch_factor(const SolveStats& stats, const Watch& since) {
   if (decades_with_new_ == 0 && factor_is_new_) decades_with_new_ = decades;
   // The next update may turn as far as this one did. Cycles alone find that out at once, conjugate
   // gradients not before kPatience steps.
-  const bool was_late = since.renewed && setup_.method == SolverMethod::cg;
-  const bool is_slower = !since.renewed && falls && decades < kWorthIt * decades_with_new_;
+  const bool was_late = renewed && setup_.method == SolverMethod::cg;
+  const bool is_slower = !renewed && falls && decades < kWorthIt * decades_with_new_;
   factor_due_ = factor_due_ || was_late || is_slower || !stats.converged;
 }
 
 /// Whether the residual falls by less than `part` of what it does with a new factor on the mean;
 /// where that is not known, whether there were many cycles.
-bool LinearSolver::is_slow(const Watch& from, const Watch& to, double part) const {
+bool LinearSolver::is_slow(const Place& from, const Place& to, double part) const {
   if (!(to.residual < from.residual)) return true;
   if (decades_with_new_ == 0) return to.cycles >= kPatience;
   const double decades = std::log10(from.residual / to.residual);
@@ -188,7 +188,8 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
   const double goal = fixed ? 0 : problem.goal;
   SolveStats stats;
   double norm = first_residual(problem);
-  Watch watch{norm / problem.reference, 0, false}, window = watch;
+  Place watched{norm / problem.reference, 0}, window = watched;
+  const int factors_before = factors_;
   ConjugateState state;
   const auto has_more = [&] { return stats.cycles < limit; };
   for (int retries = 0; norm > goal && has_more() && retries <= kRetries;) {
@@ -208,21 +209,21 @@ SolveStats LinearSolver::conjugate_gradients(const Problem& problem, bool jacobi
       ++stats.cycles;
       if (progress_) progress_(stats.cycles, norm / problem.reference);
       if (jacobi || stats.cycles - window.cycles < kPatience) continue;
-      const Watch now{norm / problem.reference, stats.cycles, true};
-      if (is_slow(window, now, kPart) && !enough() && has_more() && renew_factor()) watch = now;
+      const Place now{norm / problem.reference, stats.cycles};
+      if (is_slow(window, now, kPart) && !enough() && has_more() && renew_factor()) watched = now;
       window = now;
     }
     const bool was_at_goal = norm <= goal;
     norm = true_residual(problem);
     if (lost) state = {};  // the next start has no direction
     if (lost && !jacobi && has_more() && renew_factor())
-      watch = window = {norm / problem.reference, stats.cycles, true};
+      watched = window = {norm / problem.reference, stats.cycles};
     else if (lost || (!fixed && (was_at_goal || !(norm < at_start))))
       ++retries;
   }
   stats.residual = norm / problem.reference;
   stats.converged = fixed || norm <= goal * (1 + 1e-12);
-  if (!jacobi) watch_factor(stats, watch);
+  if (!jacobi) watch_factor(stats, watched, factors_ > factors_before);
   return stats;
 }
 
@@ -232,27 +233,28 @@ SolveStats LinearSolver::multigrid(const Problem& problem) {
   const int limit = fixed ? setup_.cycles : setup_.max_cycles;
   SolveStats stats;
   double norm = first_residual(problem);
-  Watch watch{norm / problem.reference, 0, false};
+  Place watched{norm / problem.reference, 0};
+  const int factors_before = factors_;
   const auto has_more = [&] { return stats.cycles < limit && (fixed || norm > problem.goal); };
   while (has_more()) {
-    const Watch before{norm / problem.reference, stats.cycles, false};
+    const Place before{norm / problem.reference, stats.cycles};
     precondition(false);
     backend_.add(0, 1, kSolution, problem.x);
     norm = true_residual(problem);
     ++stats.cycles;
-    const Watch now{norm / problem.reference, stats.cycles, true};
+    const Place now{norm / problem.reference, stats.cycles};
     if (is_slow(before, now, kPart) && has_more() && renew_factor()) {
       if (!(now.residual < before.residual)) {  // x is not far: what rounding leaves is solved for
         backend_.add(0, -1, kSolution, problem.x);
         norm = true_residual(problem);
       }
-      watch = {norm / problem.reference, stats.cycles, true};
+      watched = {norm / problem.reference, stats.cycles};
     }
     if (progress_) progress_(stats.cycles, norm / problem.reference);
   }
   stats.residual = norm / problem.reference;
   stats.converged = fixed || norm <= problem.goal;
-  watch_factor(stats, watch);
+  watch_factor(stats, watched, factors_ > factors_before);
   return stats;
 }
 

@@ -77,15 +77,15 @@ class LinearSolver {
   double true_residual(const Problem& problem);
   void precondition(bool jacobi);
 
-  /// A place in a solve; renewed: with a factor that was made in it.
-  struct Watch {
+  /// How far a solve has come.
+  struct Place {
     double residual;
     int cycles;
-    bool renewed;
   };
   bool renew_factor();
-  void watch_factor(const SolveStats& stats, const Watch& since);
-  bool is_slow(const Watch& from, const Watch& to, double part) const;
+  /// `since`: from where on the solve had the factor that it ends with; renewed: made within it.
+  void watch_factor(const SolveStats& stats, const Place& since, bool renewed);
+  bool is_slow(const Place& from, const Place& to, double part) const;
 
   Backend& backend_;
   SolverSetup setup_;
