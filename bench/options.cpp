@@ -105,7 +105,7 @@ std::string usage() {
          "  --backend LIST     what runs (default: cpu)\n"
          "  --compare A,B      runs these two backends; ends with a table of both side by side\n"
          "  --threads LIST     numbers of threads (default: all cores)\n"
-         "  --precision LIST   single, mixed, double (default: double)\n"
+         "  --precision LIST   mixed, double (default: double)\n"
          "  --phase LIST       what is timed (default: all)\n"
          "  --repeat N         runs of each after one that warms up (default: 5); short ones more\n"
          "  --seconds S        no further run of what has taken so long (default: no limit)\n"

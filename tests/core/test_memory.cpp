@@ -39,6 +39,13 @@ TEST(Memory, OfAUniformBodyInMixedPrecisionIsBounded) {
   EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), true), 440);
 }
 
+TEST(Memory, OfALargeUniformBodyWithItsSurfaceIsBelow400) {
+  SimulationSetup setup = cube(TimeMode::dynamic);
+  setup.body.resolution = 96;
+  setup.surface = SurfaceMethod::dual_contouring;
+  EXPECT_LE(bytes_a_cell(setup, true), 400);
+}
+
 TEST(Memory, OfAUniformBodyInDoublePrecisionIsBounded) {
   EXPECT_LE(bytes_a_cell(cube(TimeMode::dynamic), false), 900);
 }
