@@ -45,15 +45,11 @@ double relative_difference(const std::vector<double>& a, const std::vector<doubl
 }
 
 const char* precision_key(Precision precision) {
-  return precision == Precision::single  ? "single"
-         : precision == Precision::mixed ? "mixed"
-                                         : "double";
+  return precision == Precision::mixed ? "mixed" : "double";
 }
 
 Precision precision_of(const std::string& key) {
-  return key == "single"  ? Precision::single
-         : key == "mixed" ? Precision::mixed
-                          : Precision::double_;
+  return key == "mixed" ? Precision::mixed : Precision::double_;
 }
 
 /// A machine and what it was made from.

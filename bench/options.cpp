@@ -57,7 +57,7 @@ const std::map<std::string, Setter>& setters() {
       {"--threads", [](Options& o, const std::string& v) { o.threads = choose_threads(v); }},
       {"--precision",
        [](Options& o, const std::string& v) {
-         o.precisions = choose("--precision", "precision", v, {"single", "mixed", "double"});
+         o.precisions = choose("--precision", "precision", v, {"mixed", "double"});
          o.all_precisions = v == kAll;
        }},
       {"--phase",
