@@ -128,27 +128,26 @@ void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestRotatio
     rotations.put(static_cast<std::size_t>(finest.lane[moves.cells[n].to]), before[n]);
 }
 
-/// Matrices without rotation of groups that have other cells than `before`, per lane, or cells with
-/// other cells or supports below. `stale`: cells of the level before with others; becomes those of
+/// Matrices without rotation of groups that cells came to or left, or whose cells have other cells
+/// or supports below. `stale`: cells of the level before with others; becomes those of
 /// this level.
 template <class S>
 void FastBackend<S>::forget_unrotated(const LevelChange& change, const PatchMoves& moves,
-                                      const std::vector<std::int32_t>& before, std::size_t level,
-                                      std::vector<std::int32_t>& stale) {
+                                      std::size_t level, std::vector<std::int32_t>& stale) {
   StoredMatrices<S>& matrices = levels_[level].matrices;
   const PatchedLevel& packed = levels_[level].patched;
   for (std::int32_t& cell : stale) cell = hierarchy_->levels[level - 1].parent[cell];
   stale.insert(stale.end(), change.cells.begin(), change.cells.end());
   std::sort(stale.begin(), stale.end());
   stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
-  for (const std::int32_t cell : stale)
-    matrices.forget_unrotated(static_cast<std::size_t>(packed.lane[cell] / kGroup));
-  for (const Range& groups : moves.groups)
-    for (std::int32_t g = groups.first; g < groups.end(); ++g) {
-      const auto cells = packed.cell.begin() + kGroup * g;
-      if (kGroup * static_cast<std::size_t>(g) >= before.size() ||
-          !std::equal(cells, cells + kGroup, before.begin() + kGroup * g))
-        matrices.forget_unrotated(static_cast<std::size_t>(g));
+  const auto forget = [&](std::int32_t lane) {
+    matrices.forget_unrotated(static_cast<std::size_t>(lane / kGroup));
+  };
+  for (const std::int32_t cell : stale) forget(packed.lane[cell]);
+  for (const PatchMoves::Move& m : moves.cells)
+    if (m.from != packed.lane[m.to]) {
+      forget(m.from);
+      forget(packed.lane[m.to]);
     }
   stale.insert(stale.end(), moves.others.begin(), moves.others.end());
 }
@@ -162,8 +161,6 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
   std::vector<std::int32_t> stale;
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     FastLevel<S>& level = levels_[l];
-    const std::vector<std::int32_t> cells_before =
-        l == 0 ? std::vector<std::int32_t>{} : level.patched.cell;
     moves = update_patches(hierarchy, change, l, l == 0 ? nullptr : &levels_[l - 1].patched,
                            l == 0 ? nullptr : &moves, threads_, level.patched);
     level.bound = 0;
@@ -179,10 +176,14 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       renumber(moves, level.patched, rotations_);
       stale = moves.others;
     } else {
-      forget_unrotated(change.levels[l], moves, cells_before, l, stale);
+      forget_unrotated(change.levels[l], moves, l, stale);
     }
   }
-  load_coarsest();
+  // The order of elimination hangs on what is beside what, and on what is held.
+  if (change.levels.back().vertices.empty())
+    factored_ = false;
+  else
+    load_coarsest();
 }
 
 template <class S>

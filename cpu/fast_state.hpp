@@ -328,8 +328,7 @@ class FastBackend final : public Backend {
                             Pack<S> (&out)[kEntries]) const;
   void merge(int fine, std::size_t group, int first, bool unrotated,
              Pack<S> (&out)[kEntries]) const;
-  void forget_unrotated(const LevelChange& change, const PatchMoves& moves,
-                        const std::vector<std::int32_t>& before, std::size_t level,
+  void forget_unrotated(const LevelChange& change, const PatchMoves& moves, std::size_t level,
                         std::vector<std::int32_t>& stale);
   template <class Value>
   void chebyshev_step(int level, const Value& value, double step, bool put);

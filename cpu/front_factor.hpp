@@ -117,8 +117,12 @@ class FrontFactor {
     const DenseFront dense(buffer.reserve(size), height, padded, stride);
     std::fill_n(dense.column(0), size, 0.0);
     for (int j = front.columns(); j < padded; ++j) dense.column(j)[j] = 1;
-    for (const Front::Entry& entry : front.entries)
-      dense.column(entry.column)[entry.row] += matrix.value[entry.value];
+    for (const Front::Block& block : front.blocks)
+      for (int c = 0; c < 3; ++c)
+        for (int r = block.row == block.column ? c : 0; r < 3; ++r) {
+          const int down = block.transposed ? c : r, across = block.transposed ? r : c;
+          dense.column(block.column + across)[block.row + down] += matrix.value[block.at(r, c)];
+        }
     for (const int child : front.below) add_rest(fronts_.all[child], rest_[child], dense);
     const auto accept = [&](int j, double pivot) {
       return j >= front.columns() || pivot > kSingular * diagonal(matrix, front, j);

@@ -87,27 +87,30 @@ class Dissection {
   /// Low ones lie before the plane. Of the others, those that touch low ones lie between.
   void split(const std::vector<int>& vertices, std::vector<int>& low, std::vector<int>& high,
              std::vector<int>& between) {
+    find_least(vertices);
     Plane best;
     for (std::size_t axis = 0; axis < 3; ++axis) look_along(axis, vertices, best);
     if (best.cost == HUGE_VAL) return;
-    find_least(best.axis, vertices);
-    for (const int v : vertices)
-      (at(v, best.axis) < best.at ? low : least_[v] < best.at ? between : high).push_back(v);
+    for (const int v : vertices) {
+      const bool touches = least_[v][best.axis] < best.at;
+      (at(v, best.axis) < best.at ? low : touches ? between : high).push_back(v);
+    }
   }
 
-  /// Of each vertex, the least place of those that it touches.
-  void find_least(std::size_t axis, const std::vector<int>& vertices) {
-    for (const int v : vertices) least_[v] = at(v, axis);
+  /// Of each vertex, the least place along each axis of those that it touches.
+  void find_least(const std::vector<int>& vertices) {
+    for (const int v : vertices) least_[v] = level_.point[v];
     for_touching(vertices, [&](int v, int w) {
-      least_[v] = std::min(least_[v], at(w, axis));
-      least_[w] = std::min(least_[w], at(v, axis));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        least_[v][axis] = std::min(least_[v][axis], at(w, axis));
+        least_[w][axis] = std::min(least_[w][axis], at(v, axis));
+      }
     });
   }
 
   /// The fewest between, to the power of 5 over the smaller part to the power of 4: measured,
   /// docs/decisions/0030-old-factors.md.
   void look_along(std::size_t axis, const std::vector<int>& vertices, Plane& best) {
-    find_least(axis, vertices);
     int first = INT32_MAX, last = INT32_MIN;
     for (const int v : vertices) {
       first = std::min(first, at(v, axis));
@@ -117,7 +120,7 @@ class Dissection {
     std::vector<int> before(planes, 0), between(planes, 0);  // changes from plane to plane
     for (const int v : vertices) {
       ++before[at(v, axis) - first + std::size_t{1}];
-      ++between[least_[v] - first + std::size_t{1}];
+      ++between[least_[v][axis] - first + std::size_t{1}];
       --between[at(v, axis) - first + std::size_t{1}];
     }
     int lower = 0, middle = 0;
@@ -146,7 +149,8 @@ class Dissection {
   const AssembledLevel& matrix_;
   std::vector<Front>& out_;
   std::vector<char> inside_;
-  std::vector<int> least_, place_;
+  std::vector<Vec3i> least_;
+  std::vector<int> place_;
 };
 
 /// Rows of all fronts, and where they are in the front above.
@@ -161,22 +165,25 @@ class Linking {
         order_[v] = next++;
       }
     place_.resize(front_of_.size());
-    list_entries();
+    list_blocks();
     for (int f = 0; f < static_cast<int>(out.all.size()); ++f) link(f);
   }
 
  private:
-  /// Each scalar of the matrix goes to the front that is eliminated first.
-  void list_entries() {
-    for (int column = 0; column < matrix_.unknowns(); ++column)
-      for (int k = matrix_.column_begin[column]; k < matrix_.column_begin[column + 1]; ++k) {
-        int first = column, last = matrix_.row[k];
-        if (front_of_[first / 3] < 0 || front_of_[last / 3] < 0) continue;
-        if (order_[last / 3] < order_[first / 3]) std::swap(first, last);
-        Front& front = out_.all[front_of_[first / 3]];
-        front.entries.push_back({k, last, first});  // scalars, for now
-        if (front_of_[last / 3] != front_of_[first / 3]) front.rows.push_back(last / 3);
+  /// Each block of the matrix goes to the front that is eliminated first.
+  void list_blocks() {
+    for (int v = 0; 3 * v < matrix_.unknowns(); ++v) {
+      const int begin = matrix_.column_begin[3 * v], end = matrix_.column_begin[3 * v + 1];
+      for (int k = begin; k < end; k += 3) {
+        int first = v, last = matrix_.row[k] / 3;
+        if (front_of_[first] < 0 || front_of_[last] < 0) continue;
+        const bool transposed = order_[last] < order_[first];
+        if (transposed) std::swap(first, last);
+        Front& front = out_.all[front_of_[first]];
+        front.blocks.push_back({k, end - begin, last, first, transposed});  // vertices, for now
+        if (front_of_[last] != front_of_[first]) front.rows.push_back(last);
       }
+    }
   }
 
   void link(int f) {
@@ -194,10 +201,9 @@ class Linking {
     for (const int v : front.vertices) place_[v] = next, next += 3;
     next = front.padded_columns();
     for (const int v : front.rows) place_[v] = next, next += 3;
-    for (Front::Entry& entry : front.entries) {
-      entry.row = place_[entry.row / 3] + entry.row % 3;
-      entry.column = place_[entry.column / 3] + entry.column % 3;
-      if (entry.row < entry.column) std::swap(entry.row, entry.column);
+    for (Front::Block& block : front.blocks) {
+      block.row = place_[block.row];
+      block.column = place_[block.column];
     }
     for (const int child : front.below)
       for (const int v : out_.all[child].rows) out_.all[child].row_place.push_back(place_[v]);

@@ -24,14 +24,19 @@
 namespace kerf::cpu {
 
 struct Front {
-  struct Entry {
-    int value;        // of the assembled level
-    int row, column;  // places, row >= column
+  /// A 3x3 block of the assembled level, or the lower triangle of one on the diagonal.
+  struct Block {
+    int value, length;  // where its first column begins, and how long the whole column is
+    int row, column;    // places of its first entry here, row >= column
+    bool transposed;    // whether it is so here
+
+    /// Of the value in row r and column c: see AssembledLevel.
+    int at(int r, int c) const { return value + c * length - c * (c + 1) / 2 + r; }
   };
   std::vector<int> vertices;   // columns: 3 times 3 * vertex + component
   std::vector<int> rows;       // vertices, each eliminated by a later front
   std::vector<int> row_place;  // per vertex in rows: the place of its x in the front above
-  std::vector<Entry> entries;
+  std::vector<Block> blocks;
   std::vector<int> below;  // fronts, rising
   std::size_t at = 0;      // of its columns in the factor
   int depth = 0;           // fronts below it have less

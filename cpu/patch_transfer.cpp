@@ -330,9 +330,8 @@ void TransferRows::add_block(std::size_t first, std::size_t count, BlockDraft& o
   out.blocks.push_back(block);
 }
 
-void TransferRows::start_rows(std::int32_t n) {
-  const Patch& patch = level_.patches[n];
-  const auto most = 8 * static_cast<std::size_t>(patch.own.size + patch.copies.size);
+void TransferRows::start_rows(std::int32_t most_rows) {
+  const auto most = 8 * static_cast<std::size_t>(most_rows);
   if (points_.size() < most) points_.resize(most), weights_.resize(most);
   row_begin_.assign(1, 0);
 }
@@ -369,7 +368,7 @@ constexpr std::size_t kMostPoints = 0x10000;  // of a part
 TransferDraft TransferRows::make(std::int32_t n) {
   const Range& own = level_.patches[n].own;
   TransferDraft out;
-  start_rows(n);
+  start_rows(own.size + level_.patches[n].copies.size);
   points_before_ = 0;
   for (std::int32_t tile = own.first / kGroup; tile < own.end() / kGroup; ++tile)
     add_tile(tile, out);
@@ -410,7 +409,7 @@ bool TransferRows::make_some(std::int32_t n, TransferDraft& out) {
   out.whole = false;
   out.tiles = tiles_to_make(patch, part);
   if (4 * kGroup * size_of(out.tiles.size()) > 3 * patch.own.size) return false;
-  start_rows(n);
+  start_rows(kGroup * size_of(out.tiles.size()) + patch.copies.size);
   points_before_ = part.points.size;
   for (std::int32_t k = 0; k < part.points.size; ++k)
     local_[level_.transfer.point[part.points.first + k]] = k + 1;

@@ -74,7 +74,7 @@ class TransferRows {
   TransferDraft make(std::int32_t patch);
   bool make_some(std::int32_t patch, TransferDraft& out);
   std::vector<std::int32_t> tiles_to_make(const Patch& patch, const TransferPart& part) const;
-  void start_rows(std::int32_t patch);
+  void start_rows(std::int32_t most_rows);
   void add_row(std::int32_t vertex, TransferDraft& out);
   void add_tile(std::int32_t tile, TransferDraft& out);
   void add_leads(std::int32_t patch, TransferDraft& out);
