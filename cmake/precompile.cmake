@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # kerf_precompile(target headers...): headers from outside that most of its sources include are read
-# once. Not with a compiler cache, which does not see into such a file; there, and so in one of the
-# builds that a change sees, each source is compiled with its own includes only.
+# once. Not with a compiler cache, which does not see into such a file; there each source is compiled
+# with its own includes only.
 set(KERF_STANDARD_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory>
   <numeric> <span> <sstream> <string> <unordered_map> <vector>)
 function(kerf_precompile target)

@@ -179,7 +179,8 @@ void FastBackend<S>::update(const Hierarchy& hierarchy, const HierarchyChange& c
       forget_unrotated(change.levels[l], moves, l, stale);
     }
   }
-  // The order of elimination hangs on what is beside what, and on what is held.
+  // The order of elimination hangs on places, which stay, on what is beside what, and on what is
+  // held.
   if (change.levels.back().vertices.empty())
     factored_ = false;
   else

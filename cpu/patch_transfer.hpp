@@ -96,7 +96,7 @@ class TransferRows {
   const PatchMoves& moves_;
   std::int32_t points_before_ = 0;  // of the part
   Marks local_;                     // per vertex of the next level: its point, from 1
-  // Rows of all vertices of a patch, its own ones first, and room for more.
+  // Rows of the tiles of a patch that are made, then of its leads, and room for more.
   std::vector<std::uint16_t> points_;
   std::vector<std::uint8_t> weights_;
   std::vector<std::uint32_t> row_begin_;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "tests/support/counted_memory.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 
@@ -11,6 +13,8 @@ std::atomic<bool> counting = false;
 std::atomic<std::size_t> allocated = 0;
 
 void* allocate(std::size_t size, std::size_t unit) {
+  if (size > SIZE_MAX - unit) throw std::bad_alloc();
+  size = std::max<std::size_t>(size, 1);
   if (counting) allocated += size;
   void* const out = std::aligned_alloc(unit, (size + unit - 1) / unit * unit);
   if (out == nullptr) throw std::bad_alloc();
