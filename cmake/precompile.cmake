@@ -9,3 +9,10 @@ function(kerf_precompile target)
     target_precompile_headers(${target} PRIVATE ${KERF_STANDARD_HEADERS} ${ARGN})
   endif()
 endfunction()
+
+# kerf_compile_together(target): where code is quick to run and slow to read, four sources at a time.
+function(kerf_compile_together target)
+  if(NOT CMAKE_CXX_COMPILER_LAUNCHER)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 4)
+  endif()
+endfunction()
