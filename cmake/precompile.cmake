@@ -10,9 +10,10 @@ function(kerf_precompile target)
   endif()
 endfunction()
 
-# kerf_compile_together(target): where code is quick to run and slow to read, four sources at a time.
-function(kerf_compile_together target)
+# kerf_compile_together(target count): so many sources at a time, where reading what they include
+# takes longer than compiling what they do. Not with a compiler cache either.
+function(kerf_compile_together target count)
   if(NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 4)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${count})
   endif()
 endfunction()

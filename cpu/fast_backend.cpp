@@ -129,8 +129,7 @@ void renumber(const PatchMoves& moves, const PatchedLevel& finest, FinestRotatio
 }
 
 /// Matrices without rotation of groups that cells came to or left, or whose cells have other cells
-/// or supports below. `stale`: cells of the level before with others; becomes those of
-/// this level.
+/// or supports below. `stale`: cells of the level before with others; becomes those of this level.
 template <class S>
 void FastBackend<S>::forget_unrotated(const LevelChange& change, const PatchMoves& moves,
                                       std::size_t level, std::vector<std::int32_t>& stale) {

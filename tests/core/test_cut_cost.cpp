@@ -6,6 +6,7 @@
 // (docs/decisions/0008-a-cut-changes-levels-in-place.md).
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <vector>
 
 #include "core/near_leaves.hpp"
