@@ -48,14 +48,16 @@ Simulation open_simulation(const Scene& scene, std::unique_ptr<Backend> backend)
       scene.setup.solver.backend == "auto" && name != "cpu" && name != "reference";
   return with_place(scene.file.string(), [&] {
     if (!may_fall_back) return Simulation(scene.setup, std::move(backend));
+    SolverSetup on_cpu = scene.setup.solver;
+    on_cpu.backend = "cpu";
     try {
-      return Simulation(scene.setup, std::move(backend));
+      Simulation simulation(scene.setup, std::move(backend));
+      simulation.set_fallback([on_cpu] { return make_backend(on_cpu); });
+      return simulation;
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::unavailable) throw;
       std::fprintf(stderr, "kerf: warning: %s; goes on with backend cpu\n", error.what());
     }
-    SolverSetup on_cpu = scene.setup.solver;
-    on_cpu.backend = "cpu";
     return Simulation(scene.setup, make_backend(on_cpu));
   });
 }

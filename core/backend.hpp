@@ -74,7 +74,10 @@ struct CycleOptions;  // core/solve/cycle.hpp
 /// Fixed components take no part: operators read them as zero and leave zero in them.
 /// Needs load() before all else but set_smoother and add_vector, and levels and vectors that are
 /// there; numbers of them are not checked.
-/// @throws Error from any call if memory or the device fails; the object is then unusable.
+/// @throws Error from any call if memory or the device fails. What is missing is then told by its
+/// kind: after one of memory (unavailable) read and read_rotations still give the vectors and
+/// rotations of level 0, but for what that call was to write, with the sizes of before if the call
+/// was an update; after a load nothing. Else the object is unusable.
 class Backend {
  public:
   virtual ~Backend() = default;

@@ -74,6 +74,7 @@ class Simulation {
   /// ("equilibrium"): phase name, cycles or updates so far, residual. Nothing of the simulation may
   /// be read then, nor step() called.
   using Progress = std::function<void(const char* phase, int cycles, double residual)>;
+  using Fallback = std::function<std::unique_ptr<Backend>()>;
 
   /// @throws Error (bad_input) for a setup that makes no sense; Error (unavailable) when memory
   /// would not suffice, before it is allocated.
@@ -90,6 +91,10 @@ class Simulation {
   /// a throw the object may only be destroyed.
   StepReport step();
   void on_progress(Progress progress);
+  /// What to go on with where a cut, or the first solve after one, asks the backend for memory that
+  /// it does not have (Error, unavailable): the state moves over, a warning says so, and the step
+  /// goes on. Taken once. Without a fallback the step throws.
+  void set_fallback(Fallback make);
 
   double time() const;
   const SimulationSetup& setup() const;

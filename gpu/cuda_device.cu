@@ -45,6 +45,7 @@ void* CudaDevice::allocate(std::size_t bytes) {
   use();
   void* at = nullptr;
   check(cudaMalloc(&at, std::max<std::size_t>(bytes, 1)), "cudaMalloc", number_, bytes);
+  ++counters_.allocations;
   counters_.bytes_held += bytes;
   counters_.bytes_most = std::max(counters_.bytes_most, counters_.bytes_held);
   return at;

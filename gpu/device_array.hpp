@@ -41,6 +41,7 @@ struct DeviceCounters {
   std::size_t replays = 0;     ///< of graphs
   std::size_t recordings = 0;  ///< of graphs
   std::size_t downloads = 0;   ///< each waits for the device
+  std::size_t allocations = 0;
   std::size_t bytes_up = 0;    ///< from the host
   std::size_t bytes_down = 0;  ///< to the host
   std::size_t bytes_held = 0;  ///< now
@@ -89,18 +90,22 @@ class DeviceArray {
     size_ = size;
   }
 
+  /// Room for so many. What was there is kept, also where there is no memory for more.
+  void reserve(std::size_t size) {
+    if (size <= capacity_) return;
+    const std::size_t wanted = grown(size);
+    T* const moved = static_cast<T*>(device_->allocate(wanted * sizeof(T)));
+    if (size_ > 0) device_->copy(moved, data_, size_ * sizeof(T));
+    const std::size_t kept = size_;
+    reset();
+    data_ = moved;
+    size_ = kept;
+    capacity_ = wanted;
+  }
+
   /// What was there is kept; what is new holds anything.
   void resize(std::size_t size) {
-    if (size > capacity_) {
-      const std::size_t wanted = grown(size);
-      T* const moved = static_cast<T*>(device_->allocate(wanted * sizeof(T)));
-      if (size_ > 0) device_->copy(moved, data_, size_ * sizeof(T));
-      const std::size_t kept = size_;
-      reset();
-      data_ = moved;
-      size_ = kept;
-      capacity_ = wanted;
-    }
+    reserve(size);
     size_ = size;
   }
 

@@ -39,6 +39,12 @@ struct DeviceVector {
       return single.data();
   }
   std::size_t size() const { return is_exact ? doubled.size() : single.size(); }
+  void reserve(std::size_t size) {
+    if (is_exact)
+      doubled.reserve(size);
+    else
+      single.reserve(size);
+  }
   void resize(std::size_t size) {
     if (is_exact)
       doubled.resize(size);
@@ -122,11 +128,11 @@ struct FinestValues {
     mass.upload(masses);
   }
 
-  /// Rotations are the caller's.
+  /// Rotations are the caller's; there is room for them afterwards.
   void update(const Hierarchy& hierarchy, const LevelChange& change, Device& device,
               Staging<Device>& staging) {
     const auto cells = count_of(hierarchy.values);
-    rotation.resize(hierarchy.values.size());
+    rotation.reserve(hierarchy.values.size());
     element.resize(hierarchy.values.size());
     std::vector<PlacedItem<Element<T>>> placed;
     for (const std::int32_t c : listed(change.cells, change.cells_before, cells))

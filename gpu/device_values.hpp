@@ -118,19 +118,25 @@ void DeviceBackend<Device, S>::update(const Hierarchy& hierarchy, const Hierarch
   ensures(&hierarchy == hierarchy_ && change.levels.size() == levels_.size(),
           "a change is not one of the hierarchy that was loaded");
   for (std::size_t l = 0; l < levels_.size(); ++l) {
-    const LevelChange& of_level = change.levels[l];
-    levels_[l].structure.update(hierarchy.levels[l], of_level, staging_);
-    fit_vectors(levels_[l], 3 * at(of_level.vertices_before));
+    levels_[l].structure.update(hierarchy.levels[l], change.levels[l], staging_);
+    for (Vector& vector : levels_[l].vectors) vector.reserve(at(levels_[l].scalars()));
   }
   const LevelChange& finest = change.levels[0];
   exact_.update(hierarchy, finest, *device_, staging_);
+  if constexpr (kMixed) single_.update(hierarchy, finest, *device_, staging_);
+  fit_to_levels();
+  const std::int32_t* const origin = staging_.put(finest.origin);
+
+  // All memory is there: what the state is made of changes last, and cannot fail.
+  for (std::size_t l = 0; l < levels_.size(); ++l)
+    fit_vectors(levels_[l], 3 * at(change.levels[l].vertices_before));
+  exact_.rotation.resize(hierarchy.values.size());
   run(count_of(finest.origin),
-      InheritRotation{staging_.put(finest.origin), finest.cells_before, exact_.rotation.data()});
+      InheritRotation{origin, finest.cells_before, exact_.rotation.data()});
   if constexpr (kMixed) {
-    single_.update(hierarchy, finest, *device_, staging_);
+    single_.rotation.resize(hierarchy.values.size());
     run(levels_[0].cells(), RoundRotation<S>{exact_.rotation.data(), single_.rotation.data()});
   }
-  fit_to_levels();
 }
 
 template <class Device, class S>

@@ -139,6 +139,23 @@ NonlinearStats Motion::lost(NonlinearStats stats, int updates, bool last_is_lost
   return stats;
 }
 
+// begin_step backwards. Newmark: v' = -v and a' = -a - v / (beta dt), as lost() says; the velocity
+// of the central scheme is found anew.
+bool Motion::rewind() {
+  static_assert(kGamma == 2 * kBeta && kBeta == 0.25);
+  if (!std::exchange(is_begun_, false)) return false;
+  const double dt = time_.step;
+  if (time_.scheme == TimeScheme::newmark) {
+    backend_.combine(0, -1, state_.velocity, 0, state_.velocity);
+    backend_.combine(0, -1 / (kBeta * dt), state_.velocity, -1, acceleration_);
+    return true;
+  }
+  // u_{n-1} = u_n + dt^2 (u_{n-1} - u_n) / dt^2
+  backend_.copy(0, state_.displacement, state_.memory);
+  backend_.add(0, dt * dt, acceleration_, state_.memory);
+  return true;
+}
+
 double Motion::residual(int out) {
   const OperatorScale damping{material_.stiffness_damping, material_.mass_damping};
   const double external = backend_.dot(0, state_.external, state_.external);
@@ -155,7 +172,9 @@ double Motion::residual(int out) {
 
 NonlinearStats Motion::step() {
   NonlinearStats stats;
+  is_begun_ = false;
   begin_step();
+  is_begun_ = true;
   backend_.set_operator({1 + material_.stiffness_damping * velocity_factor(),
                          acceleration_factor() + material_.mass_damping * velocity_factor()});
   double reference = 0, previous = 0;  // residual before the first update, and the one just made
@@ -179,6 +198,7 @@ NonlinearStats Motion::step() {
     ++stats.rotation_updates;
     if (!std::isfinite(solve.residual)) return lost(stats, update, false);
     keep_way_back();
+    is_begun_ = false;
     move(1);
     backend_.add(0, acceleration_factor(), increment_, acceleration_);
   }

@@ -41,6 +41,9 @@ class Motion {
   /// and velocity are those of the last update that was finite; before the first one u_n, and v_n
   /// (central: (u_n - u_{n-1}) / dt). The acceleration is then of no use.
   NonlinearStats step();
+  /// After a step that threw: the state of before it, but for rounding. Returns false, and changes
+  /// nothing, where an update had been added already.
+  bool rewind();
 
  private:
   // Coefficients of u_{n+1} in velocity and acceleration.
@@ -63,6 +66,7 @@ class Motion {
   int acceleration_, right_, increment_, work_, scratch_;
   StateVectors far_;  // displacement and velocity before the last update, if it went far
   bool is_far_ = false;
+  bool is_begun_ = false;         // and no update was added
   std::vector<double> returned_;  // per update: the residual after it over that before it, when the
                                   // rotations had moved, in the last step
   double largest_force_ = 0;      // of the terms of the last residual

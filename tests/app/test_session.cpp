@@ -39,6 +39,20 @@ TEST(Session, AutoGoesOnOnTheCpuWhereTheBodyIsTooLargeForTheGpu) {
   EXPECT_TRUE(simulation.step().converged);
 }
 
+TEST(Session, AutoGoesOnOnTheCpuWhereTheMemoryOfTheGpuEndsInTheMiddleOfARun) {
+  test::MirrorOptions options;
+  const Simulation whole = open_simulation(scene("auto"), test::make_mirror_backend(false));
+  options.allocations = test::counters_of(const_cast<Backend&>(whole.backend())).allocations;
+  Simulation simulation = open_simulation(scene("auto"), test::make_mirror_backend(false, options));
+  ASSERT_EQ(simulation.backend().name(), std::string("mirror"));
+
+  EXPECT_TRUE(simulation.step().converged);
+
+  EXPECT_EQ(simulation.backend().name(), std::string("cpu"));
+  ASSERT_EQ(simulation.warnings().size(), 1u);
+  EXPECT_NE(simulation.warnings()[0].find("goes on with backend cpu"), std::string::npos);
+}
+
 TEST(Session, ABackendThatWasNamedIsNotReplaced) {
   EXPECT_THROW(open_simulation(scene("cuda"), small_device()), Error);
 }

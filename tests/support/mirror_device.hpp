@@ -26,6 +26,7 @@ enum class ThreadOrder { rising, falling, strided };
 struct MirrorOptions {
   ThreadOrder order = ThreadOrder::rising;
   std::size_t memory = std::size_t{1} << 34;  ///< bytes; beyond, allocations fail
+  std::size_t allocations = ~std::size_t{0};  ///< that succeed; all further ones fail
   bool updates = true;                        ///< false: the backend loads anew after each cut
 };
 
