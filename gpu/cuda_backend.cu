@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// All code for the device. In one file, since both precisions share half of it, and since the compiler
-// takes ten seconds to read what each file includes.
+// All code for the device. In one file, since both precisions share half of it, and since the
+// compiler takes ten seconds to read what each file includes.
 #include "gpu/cuda_backend.hpp"
 #include "gpu/cuda_device.cuh"
 #include "gpu/device_ceilings.hpp"

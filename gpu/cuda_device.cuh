@@ -30,6 +30,19 @@ __global__ void run_body(std::int32_t count, const Body body) {
   if (i < count) body(static_cast<std::int32_t>(i));
 }
 
+/// A body of bodies/blocks.hpp, a block of threads a block.
+template <class Body>
+__global__ void __launch_bounds__(Body::kThreads) run_blocks(const Body body) {
+  __shared__ typename Body::Shared shared;
+  typename Body::State state{};
+  const auto block = static_cast<std::int32_t>(blockIdx.x);
+  const std::int32_t phases = body.phases(block);
+  for (std::int32_t phase = 0; phase < phases; ++phase) {
+    body(phase, block, static_cast<int>(threadIdx.x), shared, state);
+    __syncthreads();
+  }
+}
+
 template <class F, class... Bodies>
 __device__ void visit_on_device(BodyList<Bodies...>, const ProgramEntry& entry, const F& f) {
   int kind = 0;
@@ -103,6 +116,15 @@ class CudaDevice {
         static_cast<unsigned>((static_cast<std::int64_t>(count) + kThreads - 1) / kThreads);
     run_body<<<blocks, kThreads, 0, stream_>>>(count, body);
     check(cudaGetLastError(), "a launch", number_, static_cast<std::size_t>(count));
+    count_launch();
+  }
+  template <class Body>
+  void launch_blocks(std::int32_t blocks, const Body& body) {
+    static_assert(std::is_trivially_copyable_v<Body>, "a body is copied to the device as it is");
+    if (blocks <= 0) return;
+    use();
+    run_blocks<<<static_cast<unsigned>(blocks), Body::kThreads, 0, stream_>>>(body);
+    check(cudaGetLastError(), "a launch of blocks", number_, static_cast<std::size_t>(blocks));
     count_launch();
   }
   template <class List>

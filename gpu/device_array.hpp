@@ -10,6 +10,7 @@
 //   void download(to, from, bytes)   to the host; waits for all that was asked for before
 //   void copy(to, from, bytes)       on the device
 //   void launch(count, body)         body(i) for i in [0, count), in any order or at once
+//   void launch_blocks(blocks, body) a body of bodies/blocks.hpp
 //   void launch_program<List>(entries, n, count)
 //                                    the launches of bodies/program.hpp one after the other, in
 //                                    one; `count` is the largest of them

@@ -21,13 +21,16 @@
 #include "core/backend.hpp"
 #include "core/base/error.hpp"
 #include "core/solve/cycle.hpp"
+#include "gpu/bodies/blocks.hpp"
 #include "gpu/bodies/dense.hpp"
 #include "gpu/bodies/products.hpp"
 #include "gpu/bodies/program.hpp"
 #include "gpu/bodies/surface.hpp"
 #include "gpu/bodies/values.hpp"
 #include "gpu/bodies/vectors.hpp"
+#include "gpu/device_blocks.hpp"
 #include "gpu/device_level.hpp"
+#include "gpu/device_options.hpp"
 
 namespace kerf::gpu {
 
@@ -91,8 +94,7 @@ class SyncedArray {
 template <class Device, class S>
 class DeviceBackend final : public Backend {
  public:
-  /// updates false: loads anew after each cut, for comparison.
-  explicit DeviceBackend(std::unique_ptr<Device> device, bool updates = true);
+  explicit DeviceBackend(std::unique_ptr<Device> device, const DeviceOptions& options = {});
 
   const char* name() const noexcept override { return Device::kName; }
   int threads() const noexcept override { return 1; }  // of the host
@@ -102,7 +104,7 @@ class DeviceBackend final : public Backend {
   Device& device() const { return *device_; }
 
   void load(const Hierarchy& hierarchy) override;
-  bool can_update() const noexcept override { return updates_; }
+  bool can_update() const noexcept override { return options_.updates; }
   void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override;
   int add_vector() override;
@@ -200,8 +202,15 @@ class DeviceBackend final : public Backend {
   T* records() const {
     return reinterpret_cast<T*>(records_.data());
   }
-  template <class T>
-  void add_cells(int level, const Scale* scale, const T* u) const;
+  bool in_blocks() const {
+    return options_.blocks && blocks_.most_cells() <= options_.most_block_cells;
+  }
+  template <class T, class Cells, class Then>
+  void gather_by_records(int level, const Cells& cells, const Then& then) const;
+  template <class T, class Cells, class Then>
+  void gather_finest(const Cells& cells, const Then& then) const;
+  template <class T, class Then>
+  void multiply(int level, const T* u, const Then& then) const;
   void compute_residual(int level);
   void chebyshev(int level);
   void colour_level(int level);
@@ -220,7 +229,7 @@ class DeviceBackend final : public Backend {
   std::array<double, sums> read_sums() const;
 
   std::unique_ptr<Device> device_;  // first: what follows gives its memory back to it
-  bool updates_;
+  DeviceOptions options_;
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   OperatorScale scale_;
@@ -228,8 +237,10 @@ class DeviceBackend final : public Backend {
   FinestValues<Device, S> single_;      // the same, rounded; empty if S is double
   DeviceArray<Device, Scale> scales_;   // of the operator, and of apply_scaled
   std::vector<DeviceLevel<Device, S>> levels_;
+  DeviceBlocks<Device> blocks_;  // of level 0
   int vectors_on_finest_ = kLevelVectors;
-  DeviceArray<Device, double> records_;  // of the cells of one level, of either type
+  DeviceArray<Device, double> records_;  // of the cells of one level, of either type; of level 0
+                                         // only without blocks
   DeviceArray<Device, double> partial_;  // sums of lanes
   DeviceArray<Device, double> totals_;   // sums
   DeviceArray<Device, ConjugateScalars> conjugate_;

@@ -14,51 +14,65 @@
 
 namespace kerf::gpu {
 
-/// What the cells add to the product of a level with u, as records.
+/// then(level, vertex, sum) with the sum of what the cells of a level add, by records.
 template <class Device, class S>
-template <class T>
-void DeviceBackend<Device, S>::add_cells(int level, const Scale* scale, const T* u) const {
-  const DeviceLevel<Device, S>& l = levels_[at(level)];
-  const LevelView view = l.view();
-  if (level == 0) {
-    run(view.cells, FinestProduct<T>{view, finest_view<T>(scale), u, records<T>()});
-  } else if constexpr (std::is_same_v<T, S>) {
-    run(view.cells, StoredProduct<S>{view, l.matrices.data(), u, records<S>()});
-  }
+template <class T, class Cells, class Then>
+void DeviceBackend<Device, S>::gather_by_records(int level, const Cells& cells,
+                                                 const Then& then) const {
+  const LevelView view = levels_[at(level)].view();
+  run(view.cells, RecordCell<T, Cells>{view, cells, records<T>()});
+  run(view.vertices, GatherVertex<T, Then>{view, records<T>(), then});
+}
+
+/// The same of level 0.
+template <class Device, class S>
+template <class T, class Cells, class Then>
+void DeviceBackend<Device, S>::gather_finest(const Cells& cells, const Then& then) const {
+  if (!in_blocks()) return gather_by_records<T>(0, cells, then);
+  ensures(program_ == nullptr, "level 0 is no part of a program");
+  device_->launch_blocks(
+      blocks_.count(), BlockGather<T, Cells, Then>{levels_[0].view(), blocks_.view(), cells, then});
+}
+
+/// The same of the product with u.
+template <class Device, class S>
+template <class T, class Then>
+void DeviceBackend<Device, S>::multiply(int level, const T* u, const Then& then) const {
+  if (level == 0)
+    gather_finest<T>(FinestCells<T>{finest_view<T>(scales_.data()), u}, then);
+  else if constexpr (std::is_same_v<T, S>)
+    gather_by_records<S>(level, StoredCells<S>{levels_[at(level)].matrices.data(), u}, then);
 }
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::apply(int level, int in, int out) {
-  ensures(vector_at(level, in).is_exact == vector_at(level, out).is_exact,
-          "apply mixes vectors of two precisions");
-  const LevelView view = level_at(level).view();
+  ensures(in != out && vector_at(level, in).is_exact == vector_at(level, out).is_exact,
+          "apply asks for two vectors of one precision");
   with(level, in, out, [&](const auto* from, auto* to) {
     using T = std::decay_t<decltype(*to)>;
-    if constexpr (std::is_same_v<std::decay_t<decltype(*from)>, T>) {
-      add_cells<T>(level, scales_.data(), from);
-      run(view.vertices, StoreSum<T>{view, records<T>(), to, true});
-    }
+    if constexpr (std::is_same_v<std::decay_t<decltype(*from)>, T>)
+      multiply<T>(level, from, SumTo<T>{to, true});
   });
   changed(level, out);
 }
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::apply_scaled(const OperatorScale& scale, int in, int out) {
-  const LevelView view = levels_[0].view();
+  ensures(in != out, "apply_scaled asks for two vectors");
   const Scale on_device{scale.stiffness, scale.mass};
   scales_.write(1, {&on_device, 1});
-  const double* const from = exact_vector(in);
-  add_cells<double>(0, scales_.data() + 1, from);
-  run(view.vertices, StoreSum<double>{view, records<double>(), exact_vector(out), false});
+  gather_finest<double>(
+      FinestCells<double>{finest_view<double>(scales_.data() + 1), exact_vector(in)},
+      SumTo<double>{exact_vector(out), false});
   changed(0, out);
 }
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::elastic_force(int displacement, int out) {
-  const LevelView view = levels_[0].view();
-  run(view.cells, ElasticForce{view, finest_view<double>(scales_.data()),
-                               exact_vector(displacement), records<double>()});
-  run(view.vertices, StoreSum<double>{view, records<double>(), exact_vector(out), false});
+  ensures(displacement != out, "elastic_force asks for two vectors");
+  gather_finest<double>(
+      ElasticCells{finest_view<double>(scales_.data()), exact_vector(displacement)},
+      SumTo<double>{exact_vector(out), false});
   changed(0, out);
 }
 
@@ -80,10 +94,8 @@ void DeviceBackend<Device, S>::compute_residual(int level) {
     copy(level, kRight, kResidual);
     return;
   }
-  const LevelView view = l.view();
-  add_cells<S>(level, scales_.data(), cycle_vector(level, kSolution));
-  run(view.vertices, StoreResidual<S>{view, records<S>(), cycle_vector(level, kRight),
-                                      cycle_vector(level, kResidual)});
+  multiply<S>(level, cycle_vector(level, kSolution),
+              ResidualTo<S>{cycle_vector(level, kRight), cycle_vector(level, kResidual)});
 }
 
 template <class Device, class S>
@@ -102,20 +114,34 @@ void DeviceBackend<Device, S>::smooth(int level, SweepOrder order, int count) {
   }
 }
 
+/// In blocks a step may not write the u that other blocks still read, so steps go to and fro
+/// between u and kKrylovX, which level 0 has no other use for.
 template <class Device, class S>
 void DeviceBackend<Device, S>::chebyshev(int level) {
   DeviceLevel<Device, S>& l = level_at(level);
-  const LevelView view = l.view();
   S* const u = cycle_vector(level, kSolution);
+  S* const other = level == 0 && in_blocks() ? cycle_vector(level, kKrylovX) : u;
+  const bool from_zero = l.solution_is_zero;
+  int left = smoother_.degree - (from_zero ? 1 : 0);  // products
+  S* at = from_zero ? nullptr : u;
   for (int step = 0; step < smoother_.degree; ++step) {
-    const bool from_zero = l.solution_is_zero;
-    if (!from_zero) add_cells<S>(level, scales_.data(), u);
-    run(view.vertices,
-        ChebyshevStep<S>{view, from_zero ? nullptr : records<S>(), l.inverse_diagonal.data(),
-                         l.factors.data() + 2 * step, cycle_vector(level, kRight),
-                         cycle_vector(level, kDirection), u});
-    l.solution_is_zero = false;
+    const bool is_first = step == 0 && from_zero;
+    if (!is_first) --left;
+    S* const to = is_first ? (left % 2 == 0 ? u : other) : (at == u ? other : u);
+    const ChebyshevTo<S> then{l.inverse_diagonal.data(),
+                              l.factors.data() + 2 * step,
+                              cycle_vector(level, kRight),
+                              cycle_vector(level, kDirection),
+                              at,
+                              to};
+    if (is_first)
+      run(l.vertices(), EachVertex<S, ChebyshevTo<S>>{l.view(), then});
+    else
+      multiply<S>(level, at, then);
+    at = to;
   }
+  if (at != u) run(l.scalars(), CopyBody<S, S>{at, u});
+  l.solution_is_zero = false;
 }
 
 template <class Device, class S>
@@ -156,7 +182,8 @@ template <class Device, class S>
 void DeviceBackend<Device, S>::restrict_residual(int fine) {
   const LevelView from = level_at(fine).view(), to = level_at(fine + 1).view();
   run(to.cells, RestrictCell<S>{from, to, cycle_vector(fine, kResidual), records<S>()});
-  run(to.vertices, StoreSum<S>{to, records<S>(), cycle_vector(fine + 1, kRight), true});
+  const SumTo<S> right{cycle_vector(fine + 1, kRight), true};
+  run(to.vertices, GatherVertex<S, SumTo<S>>{to, records<S>(), right});
   zero(fine + 1, kSolution);
 }
 

@@ -15,12 +15,14 @@
 namespace kerf::gpu {
 
 template <class Device, class S>
-DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device, bool updates)
+DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device,
+                                        const DeviceOptions& options)
     : device_(std::move(device)),
-      updates_(updates),
+      options_(options),
       exact_(*device_),
       single_(*device_),
       scales_(*device_),
+      blocks_(*device_),
       records_(*device_),
       partial_(*device_),
       totals_(*device_),
@@ -77,6 +79,7 @@ void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
       level.vectors.emplace_back(*device_, std::ssize(level.vectors) >= kLevelVectors);
     fit_vectors(level, 0);
   }
+  if (options_.blocks) blocks_.load(hierarchy.levels[0], levels_[0].view());
   fit_to_levels();
 }
 
@@ -104,7 +107,8 @@ void DeviceBackend<Device, S>::fit_to_levels() {
     level.colours = {};
     level.inverse_diagonal.assign(at(level.vertices()));
     if (l > 0) level.matrices.assign(kernels::tiled_size(at(level.cells()), kEntries, kTileLog2));
-    most = std::max(most, kernels::tiled_size(at(level.cells()), kUnknowns, kTileLog2));
+    if (l > 0 || !in_blocks())
+      most = std::max(most, kernels::tiled_size(at(level.cells()), kUnknowns, kTileLog2));
   }
   records_.assign(most);
   krylov_.assign(levels_.size());
@@ -121,6 +125,8 @@ void DeviceBackend<Device, S>::update(const Hierarchy& hierarchy, const Hierarch
     levels_[l].structure.update(hierarchy.levels[l], change.levels[l], staging_);
     for (Vector& vector : levels_[l].vectors) vector.reserve(at(levels_[l].scalars()));
   }
+  if (options_.blocks)
+    blocks_.update(hierarchy.levels[0], change.levels[0], levels_[0].view(), staging_);
   const LevelChange& finest = change.levels[0];
   exact_.update(hierarchy, finest, *device_, staging_);
   if constexpr (kMixed) single_.update(hierarchy, finest, *device_, staging_);

@@ -40,6 +40,18 @@ struct LevelView {
   KERF_HD std::int32_t slot(std::int32_t cell, int i) const { return slots[kCorners * cell + i]; }
 };
 
+/// Vertices that a block of threads finishes at once.
+inline constexpr int kBlockVertices = 256;
+
+/// The vertices of level 0 in blocks of such as lie together, and the cells around each block.
+struct BlockView {
+  const std::int32_t* order;          ///< vertices, block after block
+  const std::int32_t *begin, *count;  ///< of the cells of a block
+  const std::int32_t* cells;          ///< ascending in each block
+  /// Beside the incidences: 8 times the place of the cell in the list of the vertex' block + slot.
+  const std::uint16_t* codes;
+};
+
 /// What an operator is made of; see OperatorScale in core/backend.hpp.
 struct Scale {
   double stiffness, mass;

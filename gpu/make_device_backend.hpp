@@ -16,8 +16,8 @@ namespace kerf::gpu {
 /// S: scalar of the cycle.
 template <class S, class Device>
 std::unique_ptr<DeviceBackend<Device, S>> make_device_backend(std::unique_ptr<Device> device,
-                                                              bool updates = true) {
-  return std::make_unique<DeviceBackend<Device, S>>(std::move(device), updates);
+                                                              const DeviceOptions& options = {}) {
+  return std::make_unique<DeviceBackend<Device, S>>(std::move(device), options);
 }
 
 }  // namespace kerf::gpu

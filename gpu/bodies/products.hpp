@@ -3,7 +3,7 @@
 // Products, smoothing and transfer. Two passes make each free of conflicts: a thread a cell writes
 // what the cell adds to its slots, then a thread a vertex gathers its incidences in their order and
 // finishes with the sum (residual, step of Chebyshev). No atomics, and the same bits in any order
-// of threads.
+// of threads. On level 0 one pass does both: blocks.hpp.
 //
 // Layout  level_view.hpp.
 #pragma once
@@ -34,112 +34,131 @@ KERF_HD void finest_product(const LevelView& level, const FinestView<T>& finest,
   kernels::fold_transpose(corners, fold, f);
 }
 
+/// Products of cells of level 0 with u.
 template <class T>
-struct FinestProduct {
-  LevelView level;
+struct FinestCells {
   FinestView<T> finest;
   const T* u;
-  T* records;
 
-  KERF_HD void operator()(std::int32_t cell) const {
-    Vec3<T> at[kCorners], f[kCorners];
-    load_slots(level, cell, u, at);
-    finest_product(level, finest, cell, at, f);
-    store_record(records, cell, f);
+  KERF_HD void forces(const LevelView& level, std::int32_t cell, Vec3<T> (&f)[kCorners]) const {
+    load_slots(level, cell, u, f);
+    finest_product(level, finest, cell, f, f);
   }
 };
 
+/// Products of cells that have a matrix.
 template <class T>
-struct StoredProduct {
-  LevelView level;
+struct StoredCells {
   const T* matrices;
   const T* u;
-  T* records;
 
-  KERF_HD void operator()(std::int32_t cell) const {
-    Vec3<T> at[kCorners], f[kCorners];
+  KERF_HD void forces(const LevelView& level, std::int32_t cell, Vec3<T> (&f)[kCorners]) const {
+    Vec3<T> at[kCorners];
     load_slots(level, cell, u, at);
     kernels::apply_packed(
         kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2), at,
         f);
+  }
+};
+
+/// Elastic forces of cells; see kernels/modes.hpp.
+struct ElasticCells {
+  FinestView<double> finest;
+  const double* displacement;
+
+  KERF_HD void forces(const LevelView& level, std::int32_t cell,
+                      Vec3<double> (&f)[kCorners]) const {
+    Vec3<double> corners[kCorners];
+    load_slots(level, cell, displacement, f);
+    kernels::unfold(f, level.fold[cell], corners);
+    kernels::elastic_force(corners, finest.rotation[cell], finest.side(cell),
+                           finest.element[cell].stiffness, finest.material(cell).modes.stiffness,
+                           corners);
+    kernels::fold_transpose(corners, level.fold[cell], f);
+  }
+};
+
+/// What a cell adds to its slots, as a record.
+template <class T, class Cells>
+struct RecordCell {
+  LevelView level;
+  Cells cells;
+  T* records;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    Vec3<T> f[kCorners];
+    cells.forces(level, cell, f);
     store_record(records, cell, f);
   }
 };
 
-/// The elastic force of a cell; see kernels/modes.hpp.
-struct ElasticForce {
-  LevelView level;
-  FinestView<double> finest;
-  const double* displacement;
-  double* records;
-
-  KERF_HD void operator()(std::int32_t cell) const {
-    Vec3<double> at[kCorners], corners[kCorners];
-    load_slots(level, cell, displacement, at);
-    kernels::unfold(at, level.fold[cell], corners);
-    kernels::elastic_force(corners, finest.rotation[cell], finest.side(cell),
-                           finest.element[cell].stiffness, finest.material(cell).modes.stiffness,
-                           corners);
-    kernels::fold_transpose(corners, level.fold[cell], at);
-    store_record(records, cell, at);
-  }
-};
-
-// ---- a thread a vertex -----------------------------------------------------------------------
+// ---- what becomes of the sum at a vertex -------------------------------------------------------
 
 /// out = the sum.
 template <class T>
-struct StoreSum {
-  LevelView level;
-  const T* records;
+struct SumTo {
   T* out;
   bool masks;
 
-  KERF_HD void operator()(std::int32_t vertex) const {
-    const Vec3<T> sum = gather_records(level, records, vertex);
+  KERF_HD void operator()(const LevelView& level, std::int32_t vertex, const Vec3<T>& sum) const {
     store(out, vertex, masks ? masked(sum, level.fixed[vertex]) : sum);
   }
 };
 
 /// r = f - the sum.
 template <class T>
-struct StoreResidual {
-  LevelView level;
-  const T* records;
+struct ResidualTo {
   const T* f;
   T* r;
 
-  KERF_HD void operator()(std::int32_t vertex) const {
-    const Vec3<T> sum = masked(gather_records(level, records, vertex), level.fixed[vertex]);
-    store(r, vertex, load(f, vertex) - sum);
+  KERF_HD void operator()(const LevelView& level, std::int32_t vertex, const Vec3<T>& sum) const {
+    store(r, vertex, load(f, vertex) - masked(sum, level.fixed[vertex]));
   }
 };
 
-/// A step of Chebyshev acceleration of block Jacobi: d = keep d + take D^-1 (f - the sum), u += d.
-/// Without records u is zero, and the first step needs no product.
+/// A step of Chebyshev acceleration of block Jacobi: d = keep d + take D^-1 (f - the sum), and u +
+/// d goes to `to`. Where cells are still to be read, that may not be u itself.
 ///
 /// Shapes  factors: take and keep of this step; on the device, since they change with the operator.
 /// Source  Adams, Brezina, Hu, Tuminaro 2003 [ABHT03]; Saad 2003, algorithm 12.1.
 template <class T>
-struct ChebyshevStep {
-  LevelView level;
-  const T* records;  ///< or null
+struct ChebyshevTo {
   const Sym3<T>* inverse;
   const T* factors;
   const T* f;
-  T *d, *u;
+  T* d;
+  const T* u;  ///< null: zero
+  T* to;
 
-  KERF_HD void operator()(std::int32_t vertex) const {
-    Vec3<T> r = load(f, vertex), before{};
-    if (records != nullptr) {
-      r -= masked(gather_records(level, records, vertex), level.fixed[vertex]);
-      before = load(static_cast<const T*>(u), vertex);
-    }
+  KERF_HD void operator()(const LevelView& level, std::int32_t vertex, const Vec3<T>& sum) const {
+    const Vec3<T> r = load(f, vertex) - masked(sum, level.fixed[vertex]);
+    const Vec3<T> before = u != nullptr ? load(u, vertex) : Vec3<T>{};
     Vec3<T> direction = factors[0] * (inverse[vertex] * r);
     if (factors[1] != T(0)) direction += factors[1] * load(static_cast<const T*>(d), vertex);
     store(d, vertex, direction);
-    store(u, vertex, before + direction);
+    store(to, vertex, before + direction);
   }
+};
+
+/// A thread a vertex: the sum of records.
+template <class T, class Then>
+struct GatherVertex {
+  LevelView level;
+  const T* records;
+  Then then;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    then(level, vertex, gather_records(level, records, vertex));
+  }
+};
+
+/// The same where u is zero, and with it the sum.
+template <class T, class Then>
+struct EachVertex {
+  LevelView level;
+  Then then;
+
+  KERF_HD void operator()(std::int32_t vertex) const { then(level, vertex, Vec3<T>{}); }
 };
 
 /// out = D^-1 in

@@ -35,11 +35,12 @@ struct BodyList {
 /// All that a cycle launches below level 0.
 template <class S>
 using CycleBodies =
-    BodyList<StoredProduct<S>, StoreSum<S>, StoreResidual<S>, ChebyshevStep<S>,
-             RelaxVertex<S, false>, RestrictCell<S>, ProlongVertex<S>, DenseSlice<S>, DenseSum<S>,
-             ZeroBody<S>, CopyBody<S, S>, CombineBody<S, S>, PartialSums<TwoDotTerms<S, S>>,
-             PartialSums<ThreeDotTerms<S>>, FoldSums, TotalSums<2, KrylovFirst>,
-             TotalSums<3, KrylovSecond>>;
+    BodyList<RecordCell<S, StoredCells<S>>, GatherVertex<S, SumTo<S>>,
+             GatherVertex<S, ResidualTo<S>>, GatherVertex<S, ChebyshevTo<S>>,
+             EachVertex<S, ChebyshevTo<S>>, RelaxVertex<S, false>, RestrictCell<S>,
+             ProlongVertex<S>, DenseSlice<S>, DenseSum<S>, ZeroBody<S>, CopyBody<S, S>,
+             CombineBody<S, S>, PartialSums<TwoDotTerms<S, S>>, PartialSums<ThreeDotTerms<S>>,
+             FoldSums, TotalSums<2, KrylovFirst>, TotalSums<3, KrylovSecond>>;
 
 template <class List, class Body>
 ProgramEntry program_entry(std::int32_t count, const Body& body) {

@@ -85,7 +85,7 @@ TEST_P(Fallback, WhicheverAllocationFailsTheRunEndsWhereItWould) {
   const Case& c = GetParam();
   const SimulationSetup setup = block(c.mode, c.scheme, c.refinement);
   MirrorOptions options;
-  options.updates = c.updates;
+  options.backend.updates = c.updates;
   Simulation expected(setup, make_mirror_backend(c.single, options));
   const std::size_t at_start = allocations(expected);
   while (!expected.finished()) EXPECT_TRUE(expected.step().converged);

@@ -59,7 +59,7 @@ TEST(MirrorRuns, UpdatesAndLoadsGiveTheSameBits) {
     setup.regions = {{make_box({{0.3, 0.2, 0}, {0.7, 0.6, 0.3}}), {1e5, 0.3, 500, 0, 0}}};
     setup.solver.smoother = refinement == 0 ? SmootherType::gauss_seidel : SmootherType::chebyshev;
     MirrorOptions loads;
-    loads.updates = false;
+    loads.backend.updates = false;
     Simulation updated(setup, make_mirror_backend(refinement == 1));
     Simulation loaded(setup, make_mirror_backend(refinement == 1, loads));
     while (!updated.finished()) {

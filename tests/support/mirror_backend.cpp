@@ -7,8 +7,8 @@ namespace kerf::test {
 
 std::unique_ptr<Backend> make_mirror_backend(bool single_cycle, const MirrorOptions& options) {
   auto device = std::make_unique<MirrorDevice>(options);
-  if (single_cycle) return gpu::make_device_backend<float>(std::move(device), options.updates);
-  return gpu::make_device_backend<double>(std::move(device), options.updates);
+  if (single_cycle) return gpu::make_device_backend<float>(std::move(device), options.backend);
+  return gpu::make_device_backend<double>(std::move(device), options.backend);
 }
 
 gpu::DeviceCounters& counters_of(Backend& mirror) {

@@ -6,11 +6,6 @@
 #include <utility>
 
 namespace kerf::test {
-namespace {
-
-constexpr int kPoison = 0xff;  // NaN, and indices that lie outside
-
-}  // namespace
 
 MirrorDevice::~MirrorDevice() {
   for (const auto& [at, bytes] : held_) std::free(at);

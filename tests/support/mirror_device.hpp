@@ -9,14 +9,17 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <map>
+#include <memory>
 #include <type_traits>
 #include <vector>
 
 #include "core/base/error.hpp"
 #include "gpu/bodies/program.hpp"
 #include "gpu/device_array.hpp"
+#include "gpu/device_options.hpp"
 
 namespace kerf::test {
 
@@ -27,7 +30,7 @@ struct MirrorOptions {
   ThreadOrder order = ThreadOrder::rising;
   std::size_t memory = std::size_t{1} << 34;  ///< bytes; beyond, allocations fail
   std::size_t allocations = ~std::size_t{0};  ///< that succeed; all further ones fail
-  bool updates = true;                        ///< false: the backend loads anew after each cut
+  gpu::DeviceOptions backend;
 };
 
 class MirrorDevice {
@@ -54,6 +57,15 @@ class MirrorDevice {
     ensures(count >= 0, "a launch of less than no threads");
     if (count == 0) return;
     submit([this, count, body] { each(count, body); });
+  }
+  template <class Body>
+  void launch_blocks(std::int32_t blocks, const Body& body) {
+    static_assert(std::is_trivially_copyable_v<Body>, "a body is copied to the device as it is");
+    ensures(blocks >= 0, "a launch of less than no blocks");
+    if (blocks == 0) return;
+    submit([this, blocks, body] {
+      each(blocks, [&](std::int32_t block) { run_block(block, body); });
+    });
   }
   template <class List>
   void launch_program(const gpu::ProgramEntry* entries, std::int32_t n, std::int32_t) {
@@ -84,8 +96,21 @@ class MirrorDevice {
         for (std::int32_t i = first; i < count; i += kStride) body(i);
     }
   }
+  /// Shared memory is fresh; the threads of a phase run in any order.
+  template <class Body>
+  void run_block(std::int32_t block, const Body& body) const {
+    const auto shared = std::make_unique<typename Body::Shared>();
+    std::memset(static_cast<void*>(shared.get()), kPoison, sizeof *shared);
+    std::vector<typename Body::State> states(Body::kThreads);
+    for (std::int32_t phase = 0; phase < body.phases(block); ++phase)
+      each(Body::kThreads, [&](std::int32_t thread) {
+        body(phase, block, thread, *shared, states[static_cast<std::size_t>(thread)]);
+      });
+  }
   void submit(std::function<void()> launch);
   void expect_inside(const void* at, std::size_t bytes) const;
+
+  static constexpr int kPoison = 0xff;  // NaN, and indices that lie outside
 
   MirrorOptions options_;
   gpu::DeviceCounters counters_;
