@@ -22,6 +22,7 @@
 #include "core/base/error.hpp"
 #include "core/solve/cycle.hpp"
 #include "gpu/bodies/blocks.hpp"
+#include "gpu/bodies/coarsen.hpp"
 #include "gpu/bodies/dense.hpp"
 #include "gpu/bodies/products.hpp"
 #include "gpu/bodies/program.hpp"

@@ -181,7 +181,9 @@ void DeviceBackend<Device, S>::gauss_seidel(int level, SweepOrder order) {
 template <class Device, class S>
 void DeviceBackend<Device, S>::restrict_residual(int fine) {
   const LevelView from = level_at(fine).view(), to = level_at(fine + 1).view();
-  run(to.cells, RestrictCell<S>{from, to, cycle_vector(fine, kResidual), records<S>()});
+  run(to.cells,
+      RestrictCell<S>{from, to, level_at(fine).first_slots.data(), level_at(fine + 1).plain.data(),
+                      cycle_vector(fine, kResidual), records<S>()});
   const SumTo<S> right{cycle_vector(fine + 1, kRight), true};
   run(to.vertices, GatherVertex<S, SumTo<S>>{to, records<S>(), right});
   zero(fine + 1, kSolution);
@@ -191,7 +193,8 @@ template <class Device, class S>
 void DeviceBackend<Device, S>::prolong_correction(int fine) {
   const LevelView to = level_at(fine).view(), from = level_at(fine + 1).view();
   run(to.vertices,
-      ProlongVertex<S>{to, from, cycle_vector(fine + 1, kSolution), cycle_vector(fine, kSolution)});
+      ProlongVertex<S>{to, from, level_at(fine).first.data(), cycle_vector(fine + 1, kSolution),
+                       cycle_vector(fine, kSolution)});
   changed(fine, kSolution);
 }
 

@@ -62,12 +62,18 @@ struct DeviceLevel {
   explicit DeviceLevel(Device& device)
       : structure(device),
         matrices(device),
+        plain(device),
+        first(device),
+        first_slots(device),
         inverse_diagonal(device),
         factors(device),
         colour_order(device) {}
 
   DeviceStructure<Device> structure;
-  DeviceArray<Device, S> matrices;  ///< tiles of 300 scalars; empty on level 0
+  DeviceArray<Device, S> matrices;                ///< tiles of 300 scalars; empty on level 0
+  DeviceArray<Device, std::uint8_t> plain;        ///< see MarkPlain; empty on level 0
+  DeviceArray<Device, std::int32_t> first;        ///< of vertices, see FindFirst
+  DeviceArray<Device, std::uint8_t> first_slots;  ///< of cells, see MarkFirst
   DeviceArray<Device, Sym3<S>> inverse_diagonal;
   DeviceArray<Device, S> factors;                ///< take and keep of each step of Chebyshev
   std::vector<DeviceVector<Device, S>> vectors;  ///< by VectorId

@@ -106,7 +106,18 @@ void DeviceBackend<Device, S>::fit_to_levels() {
     level.solution_is_zero = false;
     level.colours = {};
     level.inverse_diagonal.assign(at(level.vertices()));
-    if (l > 0) level.matrices.assign(kernels::tiled_size(at(level.cells()), kEntries, kTileLog2));
+    if (l + 1 < levels_.size()) {
+      level.first.assign(at(level.vertices()));
+      level.first_slots.assign(at(level.cells()));
+      run(level.vertices(), FindFirst{level.view(), level.first.data()});
+      run(level.cells(), MarkFirst{level.view(), level.first.data(), level.first_slots.data()});
+    }
+    if (l > 0) {
+      level.matrices.assign(kernels::tiled_size(at(level.cells()), kEntries, kTileLog2));
+      level.plain.assign(at(level.cells()));
+      run(level.cells(),
+          MarkPlain{levels_[l - 1].view(), level.view(), l == 1, level.plain.data()});
+    }
     if (l > 0 || !in_blocks())
       most = std::max(most, kernels::tiled_size(at(level.cells()), kUnknowns, kTileLog2));
   }
@@ -208,10 +219,17 @@ template <class Device, class S>
 void DeviceBackend<Device, S>::coarsen(int fine) {
   const LevelView from = level_at(fine).view(), to = level_at(fine + 1).view();
   S* const matrices = level_at(fine + 1).matrices.data();
-  if (fine == 0)
-    run(to.cells, CoarsenFinest<S>{from, to, finest_view<S>(scales_.data()), matrices});
-  else
-    run(to.cells, CoarsenStored<S>{from, to, level_at(fine).matrices.data(), matrices});
+  const std::uint8_t* const plain = level_at(fine + 1).plain.data();
+  const std::int32_t tasks = coarsen_tasks(to.cells);
+  if (fine == 0) {
+    const FinestView<S> finest = finest_view<S>(scales_.data());
+    run(tasks, CoarsenFinestPlain<S>{from, to, finest, plain, matrices});
+    run(tasks, CoarsenFinestOther<S>{from, to, finest, plain, matrices});
+  } else {
+    const S* const stored = level_at(fine).matrices.data();
+    run(tasks, CoarsenStoredPlain<S>{from, to, stored, plain, matrices});
+    run(tasks, CoarsenStoredOther<S>{from, to, stored, plain, matrices});
+  }
 }
 
 template <class Device, class S>

@@ -21,6 +21,14 @@
 #define KERF_PACK_BITS 0
 #endif
 
+// Before a loop of constant length: what it indexes is to stay in registers of a device. The host's
+// compiler decides by itself.
+#if defined(__CUDA_ARCH__)
+#define KERF_UNROLL _Pragma("unroll")
+#else
+#define KERF_UNROLL
+#endif
+
 // Inlines all that a function calls. With packs of 512 bits frames come to be 4096 bytes apart, and
 // loads of one wait for stores to the other; elsewhere it gains nothing and takes long to compile.
 #if KERF_PACK_BITS == 512 && !defined(__CUDACC__) && !defined(__SANITIZE_ADDRESS__) && \

@@ -43,9 +43,12 @@ KERF_HD Sym3<T> packed_diagonal(const Matrix& A, int slot) {
 template <class T, class Matrix>
 KERF_HD void apply_packed(const Matrix& A, const Vec3<T> (&u)[kCorners], Vec3<T> (&y)[kCorners]) {
   T in[kUnknowns], out[kUnknowns];
+  KERF_UNROLL
   for (int i = 0; i < kUnknowns; ++i) in[i] = u[i / 3][i % 3];
+  KERF_UNROLL
   for (int row = 0; row < kUnknowns; ++row) {
     T sum = T(0);
+    KERF_UNROLL
     for (int col = 0; col < row; ++col) {
       const T a = A[packed_index(row, col)];
       sum = fma(a, in[col], sum);
@@ -53,6 +56,7 @@ KERF_HD void apply_packed(const Matrix& A, const Vec3<T> (&u)[kCorners], Vec3<T>
     }
     out[row] = fma(A[packed_index(row, row)], in[row], sum);
   }
+  KERF_UNROLL
   for (int i = 0; i < kCorners; ++i) y[i] = {out[3 * i], out[3 * i + 1], out[3 * i + 2]};
 }
 

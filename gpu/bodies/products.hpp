@@ -10,6 +10,7 @@
 
 #include "gpu/bodies/values.hpp"
 #include "gpu/bodies/vectors.hpp"
+#include "kernels/component_coarsen.hpp"
 #include "kernels/relax.hpp"
 
 namespace kerf::gpu {
@@ -240,30 +241,83 @@ struct RelaxVertex {
 
 // ---- transfer --------------------------------------------------------------------------------
 
-/// What the children of a coarse cell hand to its slots. A fine vertex counts once, although many
-/// cells meet it: its first incidence speaks for it.
+/// The first incidence of a vertex, which speaks for it: a vertex counts once, although many cells
+/// meet it.
+struct FindFirst {
+  LevelView level;
+  std::int32_t* first;
+
+  KERF_HD void operator()(std::int32_t vertex) const {
+    first[vertex] = level.incidence[level.incidence_begin[vertex]];
+  }
+};
+/// Of which of its slots a cell is the first: a bit each.
+struct MarkFirst {
+  LevelView level;
+  const std::int32_t* first;
+  std::uint8_t* slots;
+
+  KERF_HD void operator()(std::int32_t cell) const {
+    int bits = 0;
+    for (int i = 0; i < kCorners; ++i)
+      bits |= (first[level.slot(cell, i)] == kCorners * cell + i ? 1 : 0) << i;
+    slots[cell] = static_cast<std::uint8_t>(bits);
+  }
+};
+
+/// What the children of a coarse cell hand to its slots.
 template <class T>
 struct RestrictCell {
   LevelView fine, coarse;
+  const std::uint8_t* first_slots;  ///< of fine cells, MarkFirst
+  const std::uint8_t* plain;        ///< of coarse cells, MarkPlain
   const T* r;
   T* records;
 
   KERF_HD void operator()(std::int32_t cell) const {
     Vec3<T> sum[kCorners];
     const std::int32_t begin = coarse.child_begin[cell];
-    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
-      const std::int32_t child = coarse.children[k];
-      T w[kCorners][kCorners];
-      kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], w);
-      for (int i = 0; i < kCorners; ++i) {
-        const std::int32_t vertex = fine.slot(child, i);
-        if (fine.incidence[fine.incidence_begin[vertex]] != kCorners * child + i) continue;
-        const Vec3<T> at = load(r, vertex);
-        for (int m = 0; m < kCorners; ++m)
-          if (w[i][m] != T(0)) sum[m] += w[i][m] * at;
-      }
+    const std::int32_t end = begin + coarse.child_count[cell];
+    if (plain[cell] != 0) {
+      T by_component[3][kCorners] = {};
+      for (std::int32_t k = begin; k < end; ++k) add_plain(coarse.children[k], by_component);
+      for (int m = 0; m < kCorners; ++m)
+        sum[m] = {by_component[0][m], by_component[1][m], by_component[2][m]};
+    } else {
+      for (std::int32_t k = begin; k < end; ++k) add(coarse.children[k], coarse.fold[cell], sum);
     }
     store_record(records, cell, sum);
+  }
+
+ private:
+  KERF_HD void add_plain(std::int32_t child, T (&sum)[3][kCorners]) const {
+    const int bits = first_slots[child], place = fine.place[child];
+    T v[3][kCorners];
+    kernels::unrolled<kCorners>([&](auto i) {
+      const bool speaks = ((bits >> i) & 1) != 0;
+      const Vec3<T> at = speaks ? load(r, fine.slot(child, i)) : Vec3<T>{};
+      v[0][i] = at.x;
+      v[1][i] = at.y;
+      v[2][i] = at.z;
+    });
+    kernels::unrolled<3>([&](auto c) {
+      kernels::restrict_axis<1>((place & 1) != 0, v[c]);
+      kernels::restrict_axis<2>((place & 2) != 0, v[c]);
+      kernels::restrict_axis<4>((place & 4) != 0, v[c]);
+      kernels::unrolled<kCorners>([&](auto m) { sum[c][m] += v[c][m]; });
+    });
+  }
+
+  KERF_HD void add(std::int32_t child, std::uint16_t fold, Vec3<T> (&sum)[kCorners]) const {
+    const int bits = first_slots[child];
+    T w[kCorners][kCorners];
+    kernels::transfer_weights(fine.fold[child], fine.place[child], fold, w);
+    for (int i = 0; i < kCorners; ++i) {
+      if (((bits >> i) & 1) == 0) continue;
+      const Vec3<T> at = load(r, fine.slot(child, i));
+      for (int m = 0; m < kCorners; ++m)
+        if (w[i][m] != T(0)) sum[m] += w[i][m] * at;
+    }
   }
 };
 
@@ -271,20 +325,36 @@ struct RestrictCell {
 template <class T>
 struct ProlongVertex {
   LevelView fine, coarse;
+  const std::int32_t* first;  ///< of fine vertices, FindFirst
   const T* from;
   T* u;
 
   KERF_HD void operator()(std::int32_t vertex) const {
-    const std::int32_t first = fine.incidence[fine.incidence_begin[vertex]];
-    const std::int32_t child = first / kCorners, cell = fine.parent[child];
-    T w[kCorners][kCorners];
-    kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], w);
+    const std::int32_t child = first[vertex] / kCorners, cell = fine.parent[child];
+    const int corner = first[vertex] % kCorners, place = fine.place[child];
+    const bool is_plain = place != kernels::kPassed && !kernels::has_hanging(fine.fold[child]) &&
+                          !kernels::has_hanging(coarse.fold[cell]);
+    const Vec3<T> change =
+        is_plain ? mean(cell, place, corner) : weighted(child, cell, place, corner);
+    store(u, vertex, load(static_cast<const T*>(u), vertex) + masked(change, fine.fixed[vertex]));
+  }
+
+ private:
+  /// Of the parent's corners between the child's own one and this one.
+  KERF_HD Vec3<T> mean(std::int32_t cell, int place, int corner) const {
     Vec3<T> sum{};
-    for (int m = 0; m < kCorners; ++m) {
-      const T weight = w[first % kCorners][m];
-      if (weight != T(0)) sum += weight * load(from, coarse.slot(cell, m));
-    }
-    store(u, vertex, load(static_cast<const T*>(u), vertex) + masked(sum, fine.fixed[vertex]));
+    KERF_UNROLL
+    for (int m = 0; m < kCorners; ++m)
+      if (kernels::is_between(place, corner, m)) sum += load(from, coarse.slot(cell, m));
+    return kernels::mean_weight<T>(place ^ corner) * sum;
+  }
+  KERF_HD Vec3<T> weighted(std::int32_t child, std::int32_t cell, int place, int corner) const {
+    T w[kCorners][kCorners];
+    kernels::transfer_weights(fine.fold[child], place, coarse.fold[cell], w);
+    Vec3<T> sum{};
+    for (int m = 0; m < kCorners; ++m)
+      if (w[corner][m] != T(0)) sum += w[corner][m] * load(from, coarse.slot(cell, m));
+    return sum;
   }
 };
 

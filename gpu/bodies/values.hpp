@@ -121,65 +121,6 @@ struct OneStoredMatrix {
   }
 };
 
-/// One child's share of a coarse matrix.
-template <class T, class Matrix>
-KERF_HD void add_child(const LevelView& fine, const LevelView& coarse, std::int32_t child,
-                       std::int32_t cell, const Matrix& A, T (&sum)[kEntries]) {
-  if (fine.place[child] == kernels::kPassed) {
-    for (int e = 0; e < kEntries; ++e) sum[e] += A[e];
-    return;
-  }
-  T weights[kCorners][kCorners];
-  kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[cell], weights);
-  kernels::coarsen_cell(A, weights, static_cast<T*>(sum));
-}
-
-template <class T>
-KERF_HD void store_matrix(T* matrices, std::int32_t cell, const T (&sum)[kEntries]) {
-  const auto to =
-      kernels::cell_entries(matrices, static_cast<std::size_t>(cell), kEntries, kTileLog2);
-  for (int e = 0; e < kEntries; ++e) to[e] = sum[e];
-}
-
-/// The matrix of a cell of level 1.
-template <class T>
-struct CoarsenFinest {
-  LevelView fine, coarse;
-  FinestView<T> finest;
-  T* matrices;
-
-  KERF_HD void operator()(std::int32_t cell) const {
-    T sum[kEntries] = {};
-    const std::int32_t begin = coarse.child_begin[cell];
-    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
-      T packed[kEntries];
-      finest_matrix(fine, finest, coarse.children[k], static_cast<T*>(packed));
-      add_child(fine, coarse, coarse.children[k], cell, static_cast<const T*>(packed), sum);
-    }
-    store_matrix(matrices, cell, sum);
-  }
-};
-
-/// The matrix of a cell of a higher level.
-template <class T>
-struct CoarsenStored {
-  LevelView fine, coarse;
-  const T* from;
-  T* matrices;
-
-  KERF_HD void operator()(std::int32_t cell) const {
-    T sum[kEntries] = {};
-    const std::int32_t begin = coarse.child_begin[cell];
-    for (std::int32_t k = begin; k < begin + coarse.child_count[cell]; ++k) {
-      const std::int32_t child = coarse.children[k];
-      add_child(fine, coarse, child, cell,
-                kernels::cell_entries(from, static_cast<std::size_t>(child), kEntries, kTileLog2),
-                sum);
-    }
-    store_matrix(matrices, cell, sum);
-  }
-};
-
 /// The block of a slot of a finest cell with itself, held components included.
 template <class T>
 KERF_HD Sym3<T> finest_block(const LevelView& level, const FinestView<T>& finest, std::int32_t cell,
