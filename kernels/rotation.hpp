@@ -252,4 +252,29 @@ KERF_HD Quat<T> extract_rotation(const Mat3<T>& F, const Quat<T>& start) {
   return rotation_horn(scaled, first);
 }
 
+/// extract_rotation in double, but for the last step in single precision, where devices have twice
+/// the arithmetic or more. That step is of 1e-6 at most, and so wrong by 1e-12 times trace over
+/// least eigenvalue of its matrix; what does not come so far goes the way of extract_rotation.
+KERF_HD Quat<double> extract_rotation_mixed(const Mat3<double>& F, const Quat<double>& start) {
+  constexpr int kIterations = 5;
+  constexpr float kNear2 = 1e-6F;  // squares of radians
+  constexpr double kLast2 = 1e-12;
+  Mat3<float> single;
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) single[a][b] = static_cast<float>(F[a][b]);
+  Quat<float> q{static_cast<float>(start.w), static_cast<float>(start.x),
+                static_cast<float>(start.y), static_cast<float>(start.z)};
+  RotationStep<float> step;
+  for (int i = 0; i < kIterations; ++i) {
+    rotation_step(single, q, step);
+    q = step.next;
+    if (!step.ascent || step.length2 <= kNear2) break;
+  }
+  if (!step.ascent) return extract_rotation(F, start);
+  RotationStep<double> last;
+  rotation_step(F, normalised(Quat<double>{q.w, q.x, q.y, q.z}), last);
+  const bool is_last = last.ascent && last.length2 <= kLast2;
+  return is_last ? normalised(last.next) : extract_rotation(F, start);
+}
+
 }  // namespace kerf::kernels

@@ -5,6 +5,8 @@
 // Layout  level_view.hpp. Matrices are over slots; rows and columns of held components are zero.
 #pragma once
 
+#include <type_traits>
+
 #include "gpu/level_view.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/corotate.hpp"
@@ -34,8 +36,12 @@ struct RotateCell {
     load_slots(level, cell, displacement, slots);
     kernels::unfold(slots, level.fold[cell], corners);
     const double side = spacing * static_cast<double>(1 << size_log2[cell]);
-    const Quat<double> q =
-        kernels::extract_rotation(kernels::mean_gradient(corners, side), rotation[cell]);
+    const Mat3<double> F = kernels::mean_gradient(corners, side);
+    Quat<double> q;
+    if constexpr (std::is_same_v<S, double>)
+      q = kernels::extract_rotation(F, rotation[cell]);
+    else
+      q = kernels::extract_rotation_mixed(F, rotation[cell]);
     rotation[cell] = q;
     if (rounded != nullptr)
       rounded[cell] = {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y),

@@ -257,6 +257,43 @@ TEST(ExtractRotation, HoldsForTheGreatestAndTheLeastNumbers) {
   }
 }
 
+// Near and far starts, strains up to inversion, cells of no volume, numbers at the ends of both
+// ranges: the same rotation, or that of the way in double to the bit.
+TEST(ExtractRotationMixed, IsThatOfTheWayInDouble) {
+  Random random(32);
+  int alike = 0, near = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const double strain = std::pow(10.0, random.uniform(-6, 0.5));
+    const double size = trial % 4 == 0 ? std::pow(10.0, random.uniform(-60, 60)) : 1;
+    Matrix3 F = size * (random.rotation() * (Matrix3::Identity() + strain * random.matrix3()));
+    if (trial % 50 == 0) F.col(1).setZero();
+    Quat<double> start = to_quat<double>(random.quaternion());
+    if (trial % 3 != 0)
+      start = to_quat<double>(Eigen::Quaterniond(oracle::best_rotation(F)) *
+                              Eigen::Quaterniond(1, 0.1 * random.normal(), 0.1, 0).normalized());
+    const Quat<double> a = extract_rotation(to_mat3<double>(F), start);
+    const Quat<double> b = extract_rotation_mixed(to_mat3<double>(F), start);
+    if (std::memcmp(&a, &b, sizeof a) == 0) {
+      ++alike;
+      continue;
+    }
+    ++near;
+    const Matrix3 A = to_eigen(to_matrix(a)), B = to_eigen(to_matrix(b));
+    ASSERT_LT((A - B).norm() * gap_of(F), 2e-12) << F;
+    ASSERT_LT((B.transpose() * B - Matrix3::Identity()).norm(), kProper) << F;
+  }
+  EXPECT_GT(alike, 1000);
+  EXPECT_GT(near, 10000);
+  const double nan = std::nan("");
+  for (const double bad : {0.0, nan, HUGE_VAL}) {
+    const Quat<double> start = normalised(to_quat<double>(random.quaternion()));
+    Mat3<double> F;
+    F[1][2] = bad;
+    EXPECT_EQ(extract_rotation_mixed(F, start), extract_rotation(F, start));
+  }
+  EXPECT_EQ(extract_rotation_mixed(Mat3<double>::identity(), {}), Quat<double>{});
+}
+
 TEST(ExtractRotation, GivesTheSameBitsTwice) {
   Random random(31);
   for (int trial = 0; trial < 100; ++trial) {
