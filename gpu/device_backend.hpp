@@ -141,6 +141,7 @@ class DeviceBackend final : public Backend {
                        std::span<Vec3d> normals) override;
 
   void zero(int level, int x) override;
+  void release(int x) override;
   void copy(int level, int from, int to) override;
   void add(int level, double a, int x, int y) override { combine(level, a, x, 1, y); }
   void combine(int level, double a, int x, double b, int y) override;
@@ -165,11 +166,10 @@ class DeviceBackend final : public Backend {
 
   static std::size_t at(int i) { return static_cast<std::size_t>(i); }
   int last_level() const { return static_cast<int>(levels_.size()) - 1; }
-  DeviceLevel<Device, S>& level_at(int l) { return levels_[at(l)]; }
-  const Vector& vector_at(int level, int x) const { return levels_[at(level)].vectors[at(x)]; }
-  S* cycle_vector(int level, int x) const {
-    return levels_[at(level)].vectors[at(x)].template in<S>();
-  }
+  DeviceLevel<Device, S>& level_at(int l) const { return levels_[at(l)]; }
+  bool has_vector(int level, int x) const { return levels_[at(level)].vectors[at(x)].size() > 0; }
+  const Vector& vector_at(int level, int x) const;
+  S* cycle_vector(int level, int x) const { return vector_at(level, x).template in<S>(); }
   double* exact_vector(int x) const {
     ensures(vector_at(0, x).is_exact, "a force is asked for in a vector of the cycle");
     return vector_at(0, x).doubled.data();
@@ -193,7 +193,7 @@ class DeviceBackend final : public Backend {
   template <class T>
   FinestView<T> finest_view(const Scale* scale) const;
   void fit_to_levels();
-  void fit_vectors(DeviceLevel<Device, S>& level, std::size_t before);
+  void grow_vectors(DeviceLevel<Device, S>& level, std::size_t before);
   void upload_factors(DeviceLevel<Device, S>& level);
   void assemble_coarsest(double share);
   bool invert_coarsest();
@@ -216,6 +216,7 @@ class DeviceBackend final : public Backend {
   void chebyshev(int level);
   void colour_level(int level);
   void gauss_seidel(int level, SweepOrder order);
+  void touch_vectors(const CycleOptions& options);
   void write_program(const CycleOptions& options);
   void descend(int level, const CycleOptions& options);
   void solve_coarse(int level, const CycleOptions& options);
@@ -234,11 +235,13 @@ class DeviceBackend final : public Backend {
   const Hierarchy* hierarchy_ = nullptr;
   SmootherOptions smoother_;
   OperatorScale scale_;
-  FinestValues<Device, double> exact_;  // of level 0
+  ElementKinds<Device> kinds_;          // of the cells of level 0
+  FinestValues<Device, double> exact_;  // of these
   FinestValues<Device, S> single_;      // the same, rounded; empty if S is double
-  DeviceArray<Device, Scale> scales_;   // of the operator, and of apply_scaled
-  std::vector<DeviceLevel<Device, S>> levels_;
-  DeviceBlocks<Device> blocks_;  // of level 0
+  DeviceRotations<Device, S> rotations_;
+  DeviceArray<Device, Scale> scales_;                   // of the operator, and of apply_scaled
+  mutable std::vector<DeviceLevel<Device, S>> levels_;  // vectors are made when they are read
+  DeviceBlocks<Device> blocks_;                         // of level 0
   int vectors_on_finest_ = kLevelVectors;
   DeviceArray<Device, double> records_;  // of the cells of one level, of either type; of level 0
                                          // only without blocks

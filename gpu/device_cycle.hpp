@@ -218,6 +218,7 @@ bool DeviceBackend<Device, S>::run_cycle(const CycleOptions& options) {
     // Memory that it needs is there before: nothing is allocated while it is recorded.
     if (!smoother_.chebyshev)
       for (int l = 0; l < last_level(); ++l) colour_level(l);
+    touch_vectors(options);
     write_program(options);
     device_->begin_recording();
     try {
@@ -231,6 +232,19 @@ bool DeviceBackend<Device, S>::run_cycle(const CycleOptions& options) {
   device_->replay(cycle_->graph);
   for (DeviceLevel<Device, S>& level : levels_) level.solution_is_zero = false;
   return true;
+}
+
+/// Memory for all vectors that a cycle uses.
+template <class Device, class S>
+void DeviceBackend<Device, S>::touch_vectors(const CycleOptions& options) {
+  for (int l = 0; l <= last_level(); ++l) {
+    for (const int x : {kSolution, kRight}) vector_at(l, x);
+    if (l == last_level()) break;
+    for (const int x : {kResidual, kDirection}) vector_at(l, x);
+    if (l == 0 && in_blocks()) vector_at(l, kKrylovX);
+    if (l == 0 || options.type != CycleType::k || options.is_once(l)) continue;
+    for (const int x : {kKrylovX, kKrylovV, kScratch}) vector_at(l, x);
+  }
 }
 
 /// What solve_coarse does from the first level on that cannot fill a device. Its solution is zero

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/backend.hpp"
@@ -14,7 +15,8 @@
 
 namespace kerf::gpu {
 
-/// A vector of one level, of the scalars S of the cycle or exact.
+/// A vector of one level, of the scalars S of the cycle or exact. Takes memory when it is first
+/// used; before, it is zero.
 template <class Device, class S>
 struct DeviceVector {
   DeviceVector(Device& device, bool exact)
@@ -39,6 +41,10 @@ struct DeviceVector {
       return single.data();
   }
   std::size_t size() const { return is_exact ? doubled.size() : single.size(); }
+  void reset() {
+    single.reset();
+    doubled.reset();
+  }
   void reserve(std::size_t size) {
     if (is_exact)
       doubled.reserve(size);
@@ -89,11 +95,6 @@ struct DeviceLevel {
 };
 
 template <class T>
-Element<T> element_of(const CellValues& values) {
-  return {static_cast<T>(values.stiffness), static_cast<T>(values.mass), values.material};
-}
-
-template <class T>
 MaterialConstants<T> material_of(double poisson, kernels::MassModel model) {
   const auto K = kernels::unit_hex_stiffness(poisson);
   const auto modes = kernels::mode_constants(poisson, model);
@@ -108,18 +109,105 @@ MaterialConstants<T> material_of(double poisson, kernels::MassModel model) {
   return out;
 }
 
-/// Rotations and element values of level 0, in one precision.
+/// The kinds of the cells of level 0 (CellValueList), of which a body has few.
+template <class Device>
+class ElementKinds {
+ public:
+  explicit ElementKinds(Device& device) : kinds_(device) {}
+
+  void load(const CellValueList& values) {
+    std::vector<std::uint16_t> kinds;
+    kinds.reserve(values.size());
+    for (std::size_t c = 0; c < values.size(); ++c) kinds.push_back(values.kind(c));
+    kinds_.upload(kinds);
+    known_ = values.kinds().size();
+  }
+  /// @returns whether there is a new kind. `cells`: those that changed.
+  bool update(const CellValueList& values, const std::vector<std::int32_t>& cells, Device& device,
+              Staging<Device>& staging) {
+    kinds_.resize(values.size());
+    std::vector<PlacedItem<std::uint16_t>> placed;
+    for (const std::int32_t c : cells)
+      placed.push_back({c, values.kind(static_cast<std::size_t>(c))});
+    device.launch(count_of(placed), WriteItem<std::uint16_t>{staging.put(placed), kinds_.data()});
+    return std::exchange(known_, values.kinds().size()) != values.kinds().size();
+  }
+  const std::uint16_t* data() const { return kinds_.data(); }
+
+ private:
+  std::size_t known_ = 0;
+  DeviceArray<Device, std::uint16_t> kinds_;
+};
+
+/// The rotations of level 0; see RotationView.
+template <class Device, class S>
+class DeviceRotations {
+ public:
+  explicit DeviceRotations(Device& device) : exact_(device), rounded_(device), rest_(device) {}
+
+  std::size_t size() const { return kMixed ? rounded_.size() : exact_.size(); }
+  void assign(std::size_t cells) {
+    each([&](auto& array) { array.assign(cells); });
+  }
+  void reserve(std::size_t cells) {
+    each([&](auto& array) { array.reserve(cells); });
+  }
+  void resize(std::size_t cells) {
+    each([&](auto& array) { array.resize(cells); });
+  }
+  RotationView view() const {
+    return {kMixed ? nullptr : exact_.data(), rounded_.data(), rest_.data()};
+  }
+  std::vector<Quat<double>> read() const {
+    std::vector<Quat<double>> out(size());
+    if constexpr (kMixed) {
+      std::vector<Quat<float>> rounded(size()), rest(size());
+      rounded_.read(0, rounded);
+      rest_.read(0, rest);
+      const RotationView host{nullptr, rounded.data(), rest.data()};
+      for (std::size_t c = 0; c < out.size(); ++c)
+        out[c] = host.get<double>(static_cast<std::int32_t>(c));
+    } else {
+      exact_.read(0, out);
+    }
+    return out;
+  }
+  void write(const std::vector<Quat<double>>& in) {
+    if constexpr (kMixed) {
+      std::vector<Quat<float>> rounded(in.size()), rest(in.size());
+      const RotationView host{nullptr, rounded.data(), rest.data()};
+      for (std::size_t c = 0; c < in.size(); ++c) host.set(static_cast<std::int32_t>(c), in[c]);
+      rounded_.write(0, rounded);
+      rest_.write(0, rest);
+    } else {
+      exact_.write(0, in);
+    }
+  }
+
+ private:
+  static constexpr bool kMixed = !std::is_same_v<S, double>;
+
+  template <class Change>
+  void each(const Change& change) {
+    if constexpr (kMixed) {
+      change(rounded_);
+      change(rest_);
+    } else {
+      change(exact_);
+    }
+  }
+
+  DeviceArray<Device, Quat<double>> exact_;
+  DeviceArray<Device, Quat<float>> rounded_, rest_;
+};
+
+/// Element values of level 0, in one precision.
 template <class Device, class T>
 struct FinestValues {
-  explicit FinestValues(Device& device)
-      : rotation(device), element(device), materials(device), mass(device) {}
+  explicit FinestValues(Device& device) : element(device), materials(device), mass(device) {}
 
-  void load(const Hierarchy& hierarchy) {
-    rotation.upload(std::vector<Quat<T>>(hierarchy.values.size()));
-    std::vector<Element<T>> elements;
-    for (std::size_t c = 0; c < hierarchy.values.size(); ++c)
-      elements.push_back(element_of<T>(hierarchy.values[c]));
-    element.upload(elements);
+  void load(const Hierarchy& hierarchy, const std::vector<CellValues>& kinds) {
+    load_kinds(kinds);
     const bool lumped = hierarchy.lumped_mass;
     const auto model = lumped ? kernels::MassModel::lumped : kernels::MassModel::consistent;
     std::vector<MaterialConstants<T>> constants;
@@ -133,21 +221,14 @@ struct FinestValues {
       for (int j = 0; j < kCorners; ++j) masses[0].m[i][j] = static_cast<T>(M.m[i][j]);
     mass.upload(masses);
   }
-
-  /// Rotations are the caller's; there is room for them afterwards.
-  void update(const Hierarchy& hierarchy, const LevelChange& change, Device& device,
-              Staging<Device>& staging) {
-    const auto cells = count_of(hierarchy.values);
-    rotation.reserve(hierarchy.values.size());
-    element.resize(hierarchy.values.size());
-    std::vector<PlacedItem<Element<T>>> placed;
-    for (const std::int32_t c : listed(change.cells, change.cells_before, cells))
-      placed.push_back({c, element_of<T>(hierarchy.values[static_cast<std::size_t>(c)])});
-    device.launch(count_of(placed), WriteItem<Element<T>>{staging.put(placed), element.data()});
+  void load_kinds(const std::vector<CellValues>& kinds) {
+    std::vector<Element<T>> elements;
+    for (const CellValues& v : kinds)
+      elements.push_back({static_cast<T>(v.stiffness), static_cast<T>(v.mass), v.material});
+    element.upload(elements);
   }
 
-  DeviceArray<Device, Quat<T>> rotation;
-  DeviceArray<Device, Element<T>> element;
+  DeviceArray<Device, Element<T>> element;  ///< of kinds
   DeviceArray<Device, MaterialConstants<T>> materials;
   DeviceArray<Device, kernels::HexMass<T>> mass;
 };

@@ -19,8 +19,10 @@ DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device,
                                         const DeviceOptions& options)
     : device_(std::move(device)),
       options_(options),
+      kinds_(*device_),
       exact_(*device_),
       single_(*device_),
+      rotations_(*device_),
       scales_(*device_),
       blocks_(*device_),
       records_(*device_),
@@ -52,8 +54,13 @@ template <class Device, class S>
 template <class T>
 FinestView<T> DeviceBackend<Device, S>::finest_view(const Scale* scale) const {
   const auto view = [&](const auto& values) -> FinestView<T> {
-    return {values.rotation.data(),  values.element.data(), levels_[0].structure.size_log2(),
-            values.materials.data(), values.mass.data(),    scale,
+    return {rotations_.view(),
+            kinds_.data(),
+            values.element.data(),
+            levels_[0].structure.size_log2(),
+            values.materials.data(),
+            values.mass.data(),
+            scale,
             hierarchy_->spacing};
   };
   if constexpr (std::is_same_v<T, double>)
@@ -67,8 +74,11 @@ FinestView<T> DeviceBackend<Device, S>::finest_view(const Scale* scale) const {
 template <class Device, class S>
 void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
   hierarchy_ = &hierarchy;
-  exact_.load(hierarchy);
-  if constexpr (kMixed) single_.load(hierarchy);
+  kinds_.load(hierarchy.values);
+  exact_.load(hierarchy, hierarchy.values.kinds());
+  if constexpr (kMixed) single_.load(hierarchy, hierarchy.values.kinds());
+  rotations_.assign(hierarchy.values.size());
+  run(count_of(hierarchy.values), StraightenCell{rotations_.view()});
   while (levels_.size() > hierarchy.levels.size()) levels_.pop_back();
   while (levels_.size() < hierarchy.levels.size()) levels_.emplace_back(*device_);
   for (std::size_t l = 0; l < levels_.size(); ++l) {
@@ -77,7 +87,7 @@ void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
     const int count = l == 0 ? vectors_on_finest_ : static_cast<int>(kLevelVectors);
     while (static_cast<int>(level.vectors.size()) < count)
       level.vectors.emplace_back(*device_, std::ssize(level.vectors) >= kLevelVectors);
-    fit_vectors(level, 0);
+    grow_vectors(level, 0);
   }
   if (options_.blocks) blocks_.load(hierarchy.levels[0], levels_[0].view());
   fit_to_levels();
@@ -85,15 +95,29 @@ void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
 
 /// Vectors of the size of the level, zero from `before` on.
 template <class Device, class S>
-void DeviceBackend<Device, S>::fit_vectors(DeviceLevel<Device, S>& level, std::size_t before) {
+void DeviceBackend<Device, S>::grow_vectors(DeviceLevel<Device, S>& level, std::size_t before) {
   const auto size = static_cast<std::size_t>(level.scalars());
   for (Vector& vector : level.vectors) {
+    if (vector.size() == 0) continue;
     vector.resize(size);
     vector.with([&](auto* x) {
       run(static_cast<std::int32_t>(size - before),
           ZeroBody<std::decay_t<decltype(*x)>>{x + before});
     });
   }
+}
+
+/// One of a level, from now on with memory.
+template <class Device, class S>
+auto DeviceBackend<Device, S>::vector_at(int level, int x) const -> const Vector& {
+  DeviceLevel<Device, S>& l = level_at(level);
+  Vector& vector = l.vectors[at(x)];
+  if (vector.size() == 0) {
+    ensures(program_ == nullptr, "a vector takes memory while a program is written");
+    vector.resize(at(l.scalars()));
+    vector.with([&](auto* to) { run(l.scalars(), ZeroBody<std::decay_t<decltype(*to)>>{to}); });
+  }
+  return vector;
 }
 
 /// All else, of which nothing is kept.
@@ -118,8 +142,9 @@ void DeviceBackend<Device, S>::fit_to_levels() {
       run(level.cells(),
           MarkPlain{levels_[l - 1].view(), level.view(), l == 1, level.plain.data()});
     }
-    if (l > 0 || !in_blocks())
-      most = std::max(most, kernels::tiled_size(at(level.cells()), kUnknowns, kTileLog2));
+    const std::size_t scalars = kernels::tiled_size(at(level.cells()), kUnknowns, kTileLog2);
+    if (l > 0) most = std::max(most, (scalars * sizeof(S) + sizeof(double) - 1) / sizeof(double));
+    if (l == 0 && !in_blocks()) most = scalars;
   }
   records_.assign(most);
   krylov_.assign(levels_.size());
@@ -134,37 +159,30 @@ void DeviceBackend<Device, S>::update(const Hierarchy& hierarchy, const Hierarch
           "a change is not one of the hierarchy that was loaded");
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     levels_[l].structure.update(hierarchy.levels[l], change.levels[l], staging_);
-    for (Vector& vector : levels_[l].vectors) vector.reserve(at(levels_[l].scalars()));
+    for (Vector& vector : levels_[l].vectors)
+      if (vector.size() > 0) vector.reserve(at(levels_[l].scalars()));
   }
-  if (options_.blocks)
-    blocks_.update(hierarchy.levels[0], change.levels[0], levels_[0].view(), staging_);
   const LevelChange& finest = change.levels[0];
-  exact_.update(hierarchy, finest, *device_, staging_);
-  if constexpr (kMixed) single_.update(hierarchy, finest, *device_, staging_);
+  if (options_.blocks) blocks_.update(hierarchy.levels[0], finest, levels_[0].view(), staging_);
+  rotations_.reserve(hierarchy.values.size());
+  const auto cells = listed(finest.cells, finest.cells_before, levels_[0].cells());
+  if (kinds_.update(hierarchy.values, cells, *device_, staging_)) {
+    exact_.load_kinds(hierarchy.values.kinds());
+    if constexpr (kMixed) single_.load_kinds(hierarchy.values.kinds());
+  }
   fit_to_levels();
   const std::int32_t* const origin = staging_.put(finest.origin);
 
   // All memory is there: what the state is made of changes last, and cannot fail.
   for (std::size_t l = 0; l < levels_.size(); ++l)
-    fit_vectors(levels_[l], 3 * at(change.levels[l].vertices_before));
-  exact_.rotation.resize(hierarchy.values.size());
-  run(count_of(finest.origin),
-      InheritRotation{origin, finest.cells_before, exact_.rotation.data()});
-  if constexpr (kMixed) {
-    single_.rotation.resize(hierarchy.values.size());
-    run(levels_[0].cells(), RoundRotation<S>{exact_.rotation.data(), single_.rotation.data()});
-  }
+    grow_vectors(levels_[l], 3 * at(change.levels[l].vertices_before));
+  rotations_.resize(hierarchy.values.size());
+  run(count_of(finest.origin), InheritRotation{origin, finest.cells_before, rotations_.view()});
 }
 
 template <class Device, class S>
 int DeviceBackend<Device, S>::add_vector() {
-  if (!levels_.empty()) {
-    DeviceLevel<Device, S>& level = levels_[0];
-    level.vectors.emplace_back(*device_, true);
-    Vector& vector = level.vectors.back();
-    vector.resize(at(level.scalars()));
-    run(level.scalars(), ZeroBody<double>{vector.doubled.data()});
-  }
+  if (!levels_.empty()) levels_[0].vectors.emplace_back(*device_, true);
   return vectors_on_finest_++;
 }
 
@@ -192,16 +210,14 @@ void DeviceBackend<Device, S>::set_operator(const OperatorScale& scale) {
 template <class Device, class S>
 void DeviceBackend<Device, S>::rotate_cells(int displacement) {
   const LevelView view = levels_[0].view();
-  run(view.cells,
-      RotateCell<S>{view, levels_[0].structure.size_log2(), hierarchy_->spacing,
-                    exact_vector(displacement), exact_.rotation.data(), single_.rotation.data()});
+  run(view.cells, RotateCell<S>{view, levels_[0].structure.size_log2(), hierarchy_->spacing,
+                                exact_vector(displacement), rotations_.view()});
 }
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::read_rotations(std::span<double> out) const {
   static_assert(sizeof(Quat<double>) == 4 * sizeof(double));  // w x y z
-  std::vector<Quat<double>> rotations(exact_.rotation.size());
-  exact_.rotation.read(0, rotations);
+  const std::vector<Quat<double>> rotations = rotations_.read();
   std::memcpy(out.data(), rotations.data(), out.size_bytes());
 }
 
@@ -210,9 +226,7 @@ void DeviceBackend<Device, S>::write_rotations(std::span<const double> in) {
   std::vector<Quat<double>> rotations(in.size() / 4);
   for (std::size_t c = 0; c < rotations.size(); ++c)
     rotations[c] = {in[4 * c], in[4 * c + 1], in[4 * c + 2], in[4 * c + 3]};
-  exact_.rotation.write(0, rotations);
-  if constexpr (kMixed)
-    run(count_of(rotations), RoundRotation<S>{exact_.rotation.data(), single_.rotation.data()});
+  rotations_.write(rotations);
 }
 
 template <class Device, class S>

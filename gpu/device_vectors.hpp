@@ -97,8 +97,19 @@ bool DeviceBackend<Device, S>::advance_conjugate(int z, int d, int q, int x, int
 template <class Device, class S>
 void DeviceBackend<Device, S>::zero(int level, int x) {
   const std::int32_t size = level_at(level).scalars();
-  vector_at(level, x).with([&](auto* to) { run(size, ZeroBody<std::decay_t<decltype(*to)>>{to}); });
+  if (has_vector(level, x))
+    vector_at(level, x).with(
+        [&](auto* to) { run(size, ZeroBody<std::decay_t<decltype(*to)>>{to}); });
   if (x == kSolution) level_at(level).solution_is_zero = true;
+}
+
+/// Those of VectorId stay, since a recorded cycle may use them.
+template <class Device, class S>
+void DeviceBackend<Device, S>::release(int x) {
+  if (x < kLevelVectors)
+    zero(0, x);
+  else if (!levels_.empty())
+    levels_[0].vectors[at(x)].reset();
 }
 
 template <class Device, class S>
@@ -146,9 +157,12 @@ void DeviceBackend<Device, S>::write(int level, int x, std::span<const double> v
 
 template <class Device, class S>
 void DeviceBackend<Device, S>::read(int level, int x, std::span<double> values) const {
-  const Vector& vector = vector_at(level, x);
-  expects(values.size() == vector.size(), "read: three values per vertex of the level");
-  if (vector.is_exact) {
+  const Vector& vector = levels_[at(level)].vectors[at(x)];
+  expects(vector.size() == 0 || values.size() == vector.size(),
+          "read: three values per vertex of the level");
+  if (vector.size() == 0) {
+    std::fill(values.begin(), values.end(), 0.0);
+  } else if (vector.is_exact) {
     vector.doubled.read(0, values);
   } else {
     std::vector<S> rounded(values.size());

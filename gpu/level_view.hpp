@@ -9,6 +9,8 @@
 //         scalars, 3 * slot + component.
 #pragma once
 
+#include <type_traits>
+
 #include "kernels/hex_element.hpp"
 #include "kernels/layout.hpp"
 #include "kernels/mat3.hpp"
@@ -57,11 +59,42 @@ struct Scale {
   double stiffness, mass;
 };
 
-/// N/m and kg, without the factors of the operator.
+/// N/m and kg, without the factors of the operator, of cells of one kind.
 template <class T>
 struct Element {
   T stiffness, mass;
   std::int32_t material;
+};
+
+/// The rotations of level 0: double, or a float and what rounding to it left, together 48 bits.
+/// Half the memory where the cycle is single, which reads the first alone.
+struct RotationView {
+  Quat<double>* exact;  ///< or null
+  Quat<float>*rounded, *rest;
+
+  template <class T>
+  KERF_HD Quat<T> get(std::int32_t cell) const {
+    if constexpr (std::is_same_v<T, float>) {
+      return rounded[cell];
+    } else {
+      if (exact != nullptr) return exact[cell];
+      const Quat<float> a = rounded[cell], b = rest[cell];
+      return {T(a.w) + T(b.w), T(a.x) + T(b.x), T(a.y) + T(b.y), T(a.z) + T(b.z)};
+    }
+  }
+  KERF_HD void set(std::int32_t cell, const Quat<double>& q) const {
+    if (exact != nullptr) {
+      exact[cell] = q;
+      return;
+    }
+    const Quat<float> a{static_cast<float>(q.w), static_cast<float>(q.x), static_cast<float>(q.y),
+                        static_cast<float>(q.z)};
+    rounded[cell] = a;
+    rest[cell] = {static_cast<float>(q.w - static_cast<double>(a.w)),
+                  static_cast<float>(q.x - static_cast<double>(a.x)),
+                  static_cast<float>(q.y - static_cast<double>(a.y)),
+                  static_cast<float>(q.z - static_cast<double>(a.z))};
+  }
 };
 
 /// Constants of one Poisson ratio.
@@ -74,8 +107,9 @@ struct MaterialConstants {
 /// Values of level 0, which stores no matrices.
 template <class T>
 struct FinestView {
-  const Quat<T>* rotation;
-  const Element<T>* element;
+  RotationView rotations;
+  const std::uint16_t* kind;  ///< of a cell
+  const Element<T>* element;  ///< of a kind
   const std::uint8_t* size_log2;
   const MaterialConstants<T>* materials;
   const kernels::HexMass<T>* mass;
@@ -85,14 +119,17 @@ struct FinestView {
   KERF_HD T side(std::int32_t cell) const {
     return static_cast<T>(spacing * static_cast<double>(1 << size_log2[cell]));
   }
+  KERF_HD Quat<T> rotation(std::int32_t cell) const { return rotations.template get<T>(cell); }
+  /// E times the side, N/m.
+  KERF_HD T unscaled_stiffness(std::int32_t cell) const { return element[kind[cell]].stiffness; }
   KERF_HD T stiffness(std::int32_t cell) const {
-    return static_cast<T>(scale->stiffness) * element[cell].stiffness;
+    return static_cast<T>(scale->stiffness) * element[kind[cell]].stiffness;
   }
   KERF_HD T inertia(std::int32_t cell) const {
-    return static_cast<T>(scale->mass) * element[cell].mass;
+    return static_cast<T>(scale->mass) * element[kind[cell]].mass;
   }
   KERF_HD const MaterialConstants<T>& material(std::int32_t cell) const {
-    return materials[element[cell].material];
+    return materials[element[kind[cell]].material];
   }
 };
 

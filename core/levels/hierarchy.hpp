@@ -96,9 +96,12 @@ struct CellValues {
 /// than 256.
 class CellValueList {
  public:
-  const CellValues& operator[](std::size_t cell) const {
-    return kinds_[low_[cell] + (is_wide() ? 256U * high_[cell] : 0U)];
+  const CellValues& operator[](std::size_t cell) const { return kinds_[kind(cell)]; }
+  /// Its place in kinds(); later kinds come behind.
+  std::uint16_t kind(std::size_t cell) const {
+    return static_cast<std::uint16_t>(low_[cell] + (is_wide() ? 256U * high_[cell] : 0U));
   }
+  const std::vector<CellValues>& kinds() const { return kinds_; }
   std::size_t size() const { return low_.size(); }
   void reserve(std::size_t size) { low_.reserve(size); }
   void clear() { resize(0); }

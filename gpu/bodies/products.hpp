@@ -72,8 +72,8 @@ struct ElasticCells {
     Vec3<double> corners[kCorners];
     load_slots(level, cell, displacement, f);
     kernels::unfold(f, level.fold[cell], corners);
-    kernels::elastic_force(corners, finest.rotation[cell], finest.side(cell),
-                           finest.element[cell].stiffness, finest.material(cell).modes.stiffness,
+    kernels::elastic_force(corners, finest.rotation(cell), finest.side(cell),
+                           finest.unscaled_stiffness(cell), finest.material(cell).modes.stiffness,
                            corners);
     kernels::fold_transpose(corners, level.fold[cell], f);
   }

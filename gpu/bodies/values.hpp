@@ -18,18 +18,18 @@ namespace kerf::gpu {
 
 template <class T>
 KERF_HD Mat3<T> rotation_of(const FinestView<T>& finest, std::int32_t cell) {
-  return kernels::to_matrix(finest.rotation[cell]);
+  return kernels::to_matrix(finest.rotation(cell));
 }
 
-/// Level 0: R of a cell from the displacements, in double, and rounded where the cycle is single.
+/// Level 0: R of a cell from the displacements, in double; where the cycle is single, by steps in
+/// single precision but for the last.
 template <class S>
 struct RotateCell {
   LevelView level;
   const std::uint8_t* size_log2;
   double spacing;
   const double* displacement;
-  Quat<double>* rotation;
-  Quat<S>* rounded;  ///< or null
+  RotationView rotations;
 
   KERF_HD void operator()(std::int32_t cell) const {
     Vec3<double> slots[kCorners], corners[kCorners];
@@ -37,27 +37,11 @@ struct RotateCell {
     kernels::unfold(slots, level.fold[cell], corners);
     const double side = spacing * static_cast<double>(1 << size_log2[cell]);
     const Mat3<double> F = kernels::mean_gradient(corners, side);
-    Quat<double> q;
+    const Quat<double> before = rotations.get<double>(cell);
     if constexpr (std::is_same_v<S, double>)
-      q = kernels::extract_rotation(F, rotation[cell]);
+      rotations.set(cell, kernels::extract_rotation(F, before));
     else
-      q = kernels::extract_rotation_mixed(F, rotation[cell]);
-    rotation[cell] = q;
-    if (rounded != nullptr)
-      rounded[cell] = {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y),
-                       static_cast<S>(q.z)};
-  }
-};
-
-template <class S>
-struct RoundRotation {
-  const Quat<double>* rotation;
-  Quat<S>* rounded;
-
-  KERF_HD void operator()(std::int32_t cell) const {
-    const Quat<double> q = rotation[cell];
-    rounded[cell] = {static_cast<S>(q.w), static_cast<S>(q.x), static_cast<S>(q.y),
-                     static_cast<S>(q.z)};
+      rotations.set(cell, kernels::extract_rotation_mixed(F, before));
   }
 };
 
@@ -65,9 +49,18 @@ struct RoundRotation {
 struct InheritRotation {
   const std::int32_t* origin;
   std::int32_t first;
-  Quat<double>* rotation;
+  RotationView rotations;
 
-  KERF_HD void operator()(std::int32_t i) const { rotation[first + i] = rotation[origin[i]]; }
+  KERF_HD void operator()(std::int32_t i) const {
+    rotations.set(first + i, rotations.get<double>(origin[i]));
+  }
+};
+
+/// No rotation.
+struct StraightenCell {
+  RotationView rotations;
+
+  KERF_HD void operator()(std::int32_t cell) const { rotations.set(cell, Quat<double>{}); }
 };
 
 /// The matrix of a finest cell over its slots.

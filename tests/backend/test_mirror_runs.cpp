@@ -113,6 +113,28 @@ TEST(MirrorRuns, RecordTheCycleOnceForEachCut) {
   EXPECT_LE(counters_of(const_cast<Backend&>(simulation.backend())).recordings, cuts + 1);
 }
 
+// 200 million cells are to fit into 139 GiB, with 2 per cent for the coarsest level: 730 bytes a
+// cell. A small body has more vertices a cell; of those of a large one, as many as cells, 0.95 is
+// left.
+TEST(MirrorRuns, TakeFewBytesACell) {
+  constexpr double kMost = 730 / 0.95;
+  SimulationSetup setup = block(0);
+  setup.body = {test::box_solid({1, 1, 1}), 32, 0};
+  setup.surface = SurfaceMethod::none;
+  setup.cuts.clear();
+  setup.time.duration = 0.02;
+  Simulation simulation(setup, make_mirror_backend(true));
+  while (!simulation.finished()) EXPECT_TRUE(simulation.step().converged);
+  const auto cells = static_cast<double>(simulation.cells());
+  const auto& coarsest = simulation.hierarchy().levels.back();
+  const double unknowns = 3.0 * static_cast<double>(coarsest.vertices());
+  const double inverse = 12 * unknowns * unknowns;  // in double while it is made, then in single
+  const auto most =
+      static_cast<double>(counters_of(const_cast<Backend&>(simulation.backend())).bytes_most);
+  EXPECT_LE((most - inverse) / cells, kMost);
+  EXPECT_GE((most - inverse) / cells, 0.8 * kMost);  // else the bound says nothing
+}
+
 TEST(MirrorRuns, StaticRunEndsWhereTheReferenceEnds) {
   constexpr double kOfTheSolver = 1e-6;  // m
   SimulationSetup setup = block(0);
