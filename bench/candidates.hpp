@@ -15,7 +15,7 @@ namespace kerf::bench {
 struct Candidate {
   std::string name;
   std::string what;
-  std::string backend;             ///< that does the work: "cpu" or "cuda"
+  std::string backend;             ///< that does the work: "cpu", "cuda", ...
   SolverSetup solver;              ///< of its cycle, step and solve
   std::set<std::string> phases;    ///< in which it differs from its backend; empty: all
   std::int32_t most_vertices = 0;  ///< above, it is skipped; 0: no limit

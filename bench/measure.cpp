@@ -143,14 +143,16 @@ void SceneRun::list_seats() {
 }
 
 // Measured on the CPU backend in double: 1500 bytes a cell for a body and one backend at an
-// operator, 1900 at a solve, 2200 at a cut, which holds a second structure for a while.
+// operator, 1900 at a solve, 2200 at a cut, which holds a second structure for a while. The
+// values of a GPU are in its own memory.
 bool SceneRun::memory_suffices() const {
   constexpr double kShared = 1100, kSecondStructure = 900, kValues = 1600;
   bool reloads = false;
   for (const Phase& phase : phases()) reloads = reloads || (phase.reloads && wanted(phase));
-  const double bytes =
-      static_cast<double>(body_->cells()) *
-      (kShared + (reloads ? kSecondStructure : 0) + kValues * static_cast<double>(seats_.size()));
+  const auto seats = static_cast<double>(std::count_if(
+      seats_.begin(), seats_.end(), [](const Seat& s) { return s.backend.rfind("cuda", 0) != 0; }));
+  const double bytes = static_cast<double>(body_->cells()) *
+                       (kShared + (reloads ? kSecondStructure : 0) + kValues * seats);
   const double available = physical_memory();
   if (bytes < 0.9 * available) return true;
   listener_.note(text("skipped ", scene_, ": its ", body_->cells(), " cells with ", seats_.size(),

@@ -94,7 +94,11 @@ const std::vector<SceneInfo>& scenes() {
       {"comb-rotated", "the same, blades turned by 30 degrees"},
       {"box1m-unknowns", "uncut cube, 69^3 cells: a million unknowns"},
       {"bunny1m-unknowns", "Stanford bunny, 117 uniform cells long: a million unknowns"},
-      {"box7m", "uncut cube, 192^3 cells: seven million cells, the long solve alone", true}};
+      {"bunny192", "Stanford bunny, 192 uniform cells long: 1.4 million cells"},
+      {"armadillo3m7", "Stanford armadillo, 378 uniform cells high: 3.7 million cells"},
+      {"box200", "uncut cube, 200^3 cells: eight million, enough to fill a GPU"},
+      {"box7m", "uncut cube, 192^3 cells: seven million cells, the long solve alone", true},
+      {"box585", "uncut cube, 585^3 cells: two hundred million, the long solve alone", true}};
   return all;
 }
 
@@ -103,6 +107,8 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
                                           std::string& missing) {
   const MeshScene bunny{"bunny.toml", "bunny00.off", 96, 28};
   const MeshScene large_bunny{"bunny.toml", "bunny00.off", 117, 30};
+  const MeshScene frame_bunny{"bunny.toml", "bunny00.off", 192, 32};
+  const MeshScene large_armadillo{"armadillo.toml", "armadillo.obj", 378, 42};
   const MeshScene armadillo{"armadillo.toml", "armadillo.obj", 128, 40};
   std::optional<SimulationSetup> out;
   if (name == "box46") out = cube(Sizes{46, 5}.of(size));
@@ -110,12 +116,17 @@ std::optional<SimulationSetup> make_scene(const std::string& name, Size size,
   if (name == "box100") out = cube(Sizes{100, 7}.of(size));
   if (name == "box128") out = cube(Sizes{128, 8}.of(size));
   if (name == "box192" || name == "box7m") out = cube(Sizes{192, 12}.of(size));
+  if (name == "box200") out = cube(Sizes{200, 11}.of(size));
+  if (name == "box585") out = cube(Sizes{585, 13}.of(size));
   if (name == "box1m-unknowns") out = cube(Sizes{69, 9}.of(size));
   if (name == "comb-aligned") out = comb(Sizes{48, 10}.of(size), 0);
   if (name == "comb-rotated") out = comb(Sizes{48, 10}.of(size), std::numbers::pi / 6);
   if (name == "bunny") out = real_body(bunny, size, false, false, folders, missing);
   if (name == "bunny1m-unknowns")
     out = real_body(large_bunny, size, false, false, folders, missing);
+  if (name == "bunny192") out = real_body(frame_bunny, size, false, false, folders, missing);
+  if (name == "armadillo3m7")
+    out = real_body(large_armadillo, size, false, false, folders, missing);
   if (name == "bunny-octree") out = real_body(bunny, size, true, false, folders, missing);
   if (name == "bunny-cut") out = real_body(bunny, size, true, true, folders, missing);
   if (name == "armadillo") out = real_body(armadillo, size, false, false, folders, missing);

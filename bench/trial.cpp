@@ -2,11 +2,23 @@
 #include "bench/trial.hpp"
 
 #include "app/backends.hpp"
+#include "gpu/cuda_backend.hpp"
 
 namespace kerf::bench {
+namespace {
+
+// Also those that are there for comparison alone.
+std::unique_ptr<Backend> make_any_backend(const SolverSetup& setup) {
+  if (setup.backend == "cuda-records")
+    return make_cuda_backend(
+        {.single_cycle = setup.precision == Precision::mixed, .records = true});
+  return make_backend(setup);
+}
+
+}  // namespace
 
 Machine::Machine(const Body& body, const SolverSetup& setup)
-    : body_(body), backend_(make_backend(setup)) {
+    : body_(body), backend_(make_any_backend(setup)) {
   load_vector = backend_->add_vector();
   bent = backend_->add_vector();
   solution = backend_->add_vector();
@@ -41,6 +53,7 @@ void Trial::drop() {
   octree.reset();
   surface.reset();
   dense_in = dense_out = {};
+  positions = normals = {};
 }
 
 void Trial::use_smoother(SmootherType type) {

@@ -66,6 +66,8 @@ struct Trial {
   std::unique_ptr<Hierarchy> hierarchy, previous;  // built by a phase, loaded into the backend
   std::unique_ptr<Structure> structure, structure_before;  // the same
   CutEvent event;
+  bool in_place = false;                  // levels followed the event so
+  std::vector<Vec3d> positions, normals;  // of the surface of a frame
 
   Backend& backend() { return machine.backend(); }
   /// Frees what a phase kept.

@@ -65,21 +65,63 @@ void run_cut_topology(Trial& t) {
   t.structure->update(*t.octree, t.event);
 }
 
-void run_cut(Trial& t) {
+/// The part of the host.
+void follow_blade(Trial& t) {
   cut_octree(t);
-  bool in_place = false;
   t.backend().workers().both(
       [&] {
         t.surface->update(*t.octree, t.event);
         t.surface->bind(*t.octree);
       },
-      [&] { in_place = t.structure->update(*t.octree, t.event); });
-  follow(t.backend(), *t.structure, in_place);
+      [&] { t.in_place = t.structure->update(*t.octree, t.event); });
+}
+
+void run_cut(Trial& t) {
+  follow_blade(t);
+  follow(t.backend(), *t.structure, t.in_place);
 }
 
 Outcome outcome_cut(Trial& t) {
   Outcome out;
   out.hash = hash_of(t.structure->hierarchy());
+  return out;
+}
+
+// frame: what a program that shows a body does for a picture while a blade passes, with the linear
+// part of a time step. Of it the host has the first part to itself.
+
+void prepare_frame(Trial& t) {
+  prepare_cut(t);
+  t.use_smoother(t.candidate.solver.smoother);
+}
+
+void run_frame(Trial& t) {
+  follow_blade(t);
+  Backend& b = t.backend();
+  follow(b, *t.structure, t.in_place);
+  const Hierarchy& hierarchy = t.structure->hierarchy();
+  const int levels = static_cast<int>(hierarchy.levels.size());
+  b.rotate_cells(t.machine.bent);
+  b.prepare(0);
+  for (int level = 0; level + 1 < levels; ++level) {
+    b.coarsen(level);
+    b.prepare(level + 1);
+  }
+  b.factor_coarsest();
+  b.copy(0, t.machine.load_vector, kRight);
+  b.zero(0, kSolution);
+  Cycle cycle(b, levels, cycle_options(t.candidate.solver, hierarchy));
+  for (int i = 0; i < 3; ++i) cycle.run();
+  const SurfaceView view = t.surface->view();
+  t.positions.resize(view.points.size());
+  t.normals.resize(view.normals);
+  b.move_points(view.points, t.machine.bent, t.positions);
+  b.surface_normals(view, t.positions, t.normals);
+}
+
+Outcome outcome_frame(Trial& t) {
+  Outcome out{std::vector<double>(3 * t.structure->finest().point.size())};
+  t.backend().read(0, kSolution, out.values);
   return out;
 }
 
@@ -185,8 +227,12 @@ std::vector<Phase> whole_phases() {
        outcome_topology, always({}), 1, true},
       {"cut", "a blade through 1 % of the cells: octree, surface, levels, backend", prepare_cut,
        run_cut, outcome_cut, always({}), 1, true},
-      {"cut-topology", "the same without surface and what the backend makes of it", prepare_cut,
+      {"cut-topology", "`cut` without surface and what the backend makes of it", prepare_cut,
        run_cut_topology, outcome_cut, always({}), 1, true},
+      {"frame", "`cut`, then `step`, and where the surface is: a picture while a blade passes",
+       prepare_frame, run_frame, outcome_frame, always({}), 2, true},
+      {"frame-host", "of that what is the host's alone: octree, surface, levels", prepare_cut,
+       follow_blade, outcome_cut, always({}), 2, true},
       {"solve", "values and linear solution to a true relative residual of 1e-8", prepare_solve,
        run_solve, outcome_solve, work_solve},
       {"step", "rotations, matrices and diagonals, three cycles", prepare_step, run_step,

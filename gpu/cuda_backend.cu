@@ -53,8 +53,9 @@ std::unique_ptr<Backend> make_cuda_backend(const CudaOptions& options) {
     throw Error(ErrorKind::unavailable,
                 "no CUDA backend: " + problem + "; or set solver.backend = \"cpu\"");
   auto device = std::make_unique<gpu::CudaDevice>(options.device);
-  if (options.single_cycle) return gpu::make_device_backend<float>(std::move(device));
-  return gpu::make_device_backend<double>(std::move(device));
+  const gpu::DeviceOptions chosen{.blocks = !options.records};
+  if (options.single_cycle) return gpu::make_device_backend<float>(std::move(device), chosen);
+  return gpu::make_device_backend<double>(std::move(device), chosen);
 }
 
 CudaCeilings measure_cuda_ceilings() {

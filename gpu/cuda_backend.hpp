@@ -14,6 +14,7 @@ struct CudaOptions {
   int device = 0;
   bool single_cycle = false;  ///< vectors and matrices of the cycle in float; what is added on
                               ///< level 0 (displacements, residuals, forces) stays double
+  bool records = false;       ///< products of level 0 by records, for comparison
 };
 
 /// Empty where a CUDA backend can be made; else the reason, in words.

@@ -206,7 +206,8 @@ TEST(BenchOptions, UnknownNamesNameTheNearest) {
   EXPECT_EQ(refusal({"--secne", "box64"}), "no option '--secne'; did you mean '--scene'?");
   EXPECT_EQ(
       refusal({"--scene", "box64", "--backend", "opencl"}),
-      "--backend: no backend 'opencl'; there are: cpu, reference, cpu-degree1, cuda, dense24, "
+      "--backend: no backend 'opencl'; there are: cpu, reference, cpu-degree1, cuda, cuda-degree1, "
+      "cuda-records, dense24, "
       "paper, cg-jacobi, cholesky");
 }
 
