@@ -2,7 +2,8 @@
 //
 // The backend of a device: memory, launches and sums. What a thread does is in bodies/, and the
 // arithmetic in kernels/. Member functions are defined in device_values.hpp, device_cycle.hpp,
-// device_vectors.hpp and device_surface.hpp; make_device_backend.hpp brings all together.
+// device_vectors.hpp, device_near.hpp and device_surface.hpp; make_device_backend.hpp brings all
+// together.
 //
 // Device  see device_array.hpp.
 // S       scalar of the cycle. Vectors that are added on level 0 are double, and so are forces.
@@ -24,6 +25,7 @@
 #include "gpu/bodies/blocks.hpp"
 #include "gpu/bodies/coarsen.hpp"
 #include "gpu/bodies/dense.hpp"
+#include "gpu/bodies/near.hpp"
 #include "gpu/bodies/products.hpp"
 #include "gpu/bodies/program.hpp"
 #include "gpu/bodies/surface.hpp"
@@ -222,6 +224,10 @@ class DeviceBackend final : public Backend {
   void solve_coarse(int level, const CycleOptions& options);
   void krylov_step(int level, const CycleOptions& options);
 
+  // device_near.hpp
+  VertexPlaces vertex_places(int displacement) const;
+  void find_bounds(const VertexPlaces& places, NearCells& out) const;
+
   // device_vectors.hpp
   template <class Body>
   void with(int level, int x, int y, const Body& body) const;
@@ -252,6 +258,9 @@ class DeviceBackend final : public Backend {
   DeviceInverse<Device, S> coarsest_;
   mutable Staging<Device> staging_, other_staging_;  // of two lists at once
   mutable DeviceArray<Device, double> values_;       // on their way to the host
+  mutable DeviceArray<Device, std::uint64_t> keys_;  // of vertices of level 0, see VertexPlaces
+  mutable DeviceArray<Device, std::uint8_t> marks_;  // of cells, and in words
+  mutable DeviceArray<Device, std::uint32_t> words_;
 
   struct RecordedCycle {
     CycleOptions options;

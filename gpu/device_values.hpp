@@ -34,6 +34,9 @@ DeviceBackend<Device, S>::DeviceBackend(std::unique_ptr<Device> device,
       staging_(*device_),
       other_staging_(*device_),
       values_(*device_),
+      keys_(*device_),
+      marks_(*device_),
+      words_(*device_),
       entries_(*device_),
       points_(*device_),
       corners_(*device_),
@@ -74,6 +77,7 @@ FinestView<T> DeviceBackend<Device, S>::finest_view(const Scale* scale) const {
 template <class Device, class S>
 void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
   hierarchy_ = &hierarchy;
+  keys_.reset();
   kinds_.load(hierarchy.values);
   exact_.load(hierarchy, hierarchy.values.kinds());
   if constexpr (kMixed) single_.load(hierarchy, hierarchy.values.kinds());

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/levels/corners.hpp"
 #include "gpu/device_backend.hpp"
 
 namespace kerf::gpu {
@@ -199,15 +198,6 @@ void DeviceBackend<Device, S>::read_some(int level, int x, std::span<const std::
     run(count_of(values), GatherBody<std::decay_t<decltype(*from)>>{numbers, from, values_.data()});
   });
   values_.read(0, values);
-}
-
-// On the host, which has the lists that a blade needs: once a cut.
-template <class Device, class S>
-NearCells DeviceBackend<Device, S>::find_near(int displacement, const BladeReach& reach,
-                                              std::span<const std::int32_t> opened) const {
-  std::vector<double> all(vector_at(0, displacement).size());
-  read(0, displacement, all);
-  return near_cells(*hierarchy_, all, reach, opened);
 }
 
 }  // namespace kerf::gpu

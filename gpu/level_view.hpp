@@ -39,7 +39,9 @@ struct LevelView {
   const std::int32_t *incidence_begin, *incidence_count, *incidence;
   const std::int32_t *child_begin, *child_count, *children;  ///< not on level 0
 
-  KERF_HD std::int32_t slot(std::int32_t cell, int i) const { return slots[kCorners * cell + i]; }
+  KERF_HD std::int32_t slot(std::int32_t cell, int i) const {
+    return slots[kCorners * static_cast<std::size_t>(cell) + static_cast<std::size_t>(i)];
+  }
 };
 
 /// Vertices that a block of threads finishes at once.

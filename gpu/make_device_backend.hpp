@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "gpu/device_cycle.hpp"
+#include "gpu/device_near.hpp"
 #include "gpu/device_surface.hpp"
 #include "gpu/device_values.hpp"
 #include "gpu/device_vectors.hpp"

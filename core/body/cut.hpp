@@ -49,15 +49,19 @@ class BladeReach {
   /// Positions that are tested count from `origin`.
   explicit BladeReach(const TriangleMesh& blade, const Vec3d& origin = {});
 
+  /// The neighbourhood of a triangle.
+  struct Slab {
+    Box3 box;
+    Vec3d normal, point;  ///< of its plane; a normal of zero: all in the box
+  };
+
   const Box3& box() const { return box_; }
+  double margin() const { return margin_; }
+  std::span<const Slab> slabs() const { return slabs_; }
   /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met.
   bool may_meet(Box3 leaf, bool has_cut_links) const;
 
  private:
-  struct Slab {
-    Box3 box;
-    Vec3d normal, point;
-  };
   Box3 box_;
   double margin_ = 0;
   std::vector<Slab> slabs_;  // around triangles; none: too many to look at

@@ -22,6 +22,8 @@ class LatticePoint {
     constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
     return static_cast<std::int32_t>(key_ >> (kBits * axis) & kMask);
   }
+  /// The coordinates, 21 bits each, x lowest.
+  std::uint64_t key() const { return key_; }
   friend bool operator==(const LatticePoint&, const LatticePoint&) = default;
 
  private:

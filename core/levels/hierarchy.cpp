@@ -320,9 +320,18 @@ void add_links_of_leaf(const LinkedOctree& body, std::int32_t number,
   }
 }
 
+void check_cell_count(std::size_t cells) {
+  constexpr std::size_t kMost = (std::size_t{1} << 28) - 1;
+  if (cells <= kMost) return;
+  throw Error(ErrorKind::unavailable,
+              text("a body of ", cells, " cells: at most ", kMost,
+                   " are possible; lower body.resolution or raise body.refinement"));
+}
+
 Level finest_level(const LinkedOctree& body) {
   Level level;
   const std::size_t cells = body.leaf_count();
+  check_cell_count(cells);
   level.corner.reserve(with_room(cells));
   level.size_log2.reserve(with_room(cells));
   level.link_begin.reserve(with_room(cells));

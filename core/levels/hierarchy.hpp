@@ -150,7 +150,12 @@ struct Hierarchy {
   std::size_t bytes() const;
 };
 
+/// Corners of cells are numbered by 31 bits.
+/// @throws Error (unavailable) for more cells than that allows.
+void check_cell_count(std::size_t cells);
+
 /// Level 0 without supports and values: cells in the order of body.leaves().
+/// @throws as check_cell_count.
 Level finest_level(const LinkedOctree& body);
 
 /// The links of a leaf, as in Level::links_of; numbers are places in body.leaves().

@@ -25,7 +25,8 @@ struct WriteCell {
 
   KERF_HD void operator()(std::int32_t i) const {
     const CellRecord& r = records[i];
-    for (int k = 0; k < kCorners; ++k) slots[kCorners * r.cell + k] = r.slots[k];
+    const auto first = kCorners * static_cast<std::size_t>(r.cell);
+    for (std::size_t k = 0; k < kCorners; ++k) slots[first + k] = r.slots[k];
     if (parent != nullptr) parent[r.cell] = r.parent;
     if (place != nullptr) place[r.cell] = r.place;
     fold[r.cell] = r.fold;

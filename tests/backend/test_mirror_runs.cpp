@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -242,6 +243,59 @@ TEST(MirrorUpdates, SendWhatTheCutTouchedAndLeaveWhatALoadLeaves) {
     }
   }
   EXPECT_GE(in_place, 2);
+}
+
+// What a blade may meet is looked for on the device, which tells a bit a cell: as the host finds
+// it, also after cuts, and of places that are no numbers.
+TEST(MirrorUpdates, CellsNearABladeAreThoseOfTheHost) {
+  for (const int refinement : {0, 2}) {
+    ProblemOptions options;
+    options.coarsest_vertices = 60;
+    options.with_oracle = false;
+    Problem p(LinkedOctree(test::box_body({24, 20, 18}), refinement), options);
+    const auto device = make_mirror_backend(refinement == 2);
+    const int u = device->add_vector();
+    device->load(p.hierarchy);
+    LevelUpdater updater;
+    const Lattice l = p.body.lattice();
+    std::size_t met = 0, opened_met = 0;
+    for (const double x : {7.3, 15.6, 16.1}) {
+      for (const double reach : {1.3, 6.0, 40.0}) {
+        const oracle::Vector at = p.deformation();
+        test::write(*device, 0, u, at);
+        const BladeReach blade(test::plane_blade(l.origin + l.spacing * Vec3d{x, 9.3, 8.2},
+                                                 {1, 0.2, 0.1}, reach * l.spacing),
+                               l.origin);
+        const std::vector<std::int32_t> opened = opened_cells(p.body);
+        const NearCells expected = near_cells(p.hierarchy, test::span_of(at), blade, opened);
+        const std::size_t down = counters_of(*device).bytes_down;
+        const NearCells found = device->find_near(u, blade, opened);
+        EXPECT_EQ(found.cells, expected.cells);
+        EXPECT_EQ(found.finite, expected.finite);
+        EXPECT_EQ(found.bounds.lo, expected.bounds.lo);
+        EXPECT_EQ(found.bounds.hi, expected.bounds.hi);
+        EXPECT_LT(counters_of(*device).bytes_down - down,
+                  8000 + p.hierarchy.values.size() / 8 + 4 + opened.size());
+        met += found.cells.size();
+        opened_met += opened.size();
+      }
+      const CutEvent event = kerf::cut(p.body, {},
+                                       test::plane_blade(l.origin + l.spacing * Vec3d{x, 9.3, 8.2},
+                                                         {1, 0.2, 0.1}, 4 * l.spacing),
+                                       1);
+      if (!p.update(updater, event)) break;
+      device->update(p.hierarchy, updater.change());
+    }
+    EXPECT_GT(met, 500u);
+    EXPECT_GT(opened_met, 100u);
+    for (const double bad : {std::nan(""), HUGE_VAL}) {
+      oracle::Vector at = p.deformation();
+      at[3 * 77 + 1] = bad;
+      test::write(*device, 0, u, at);
+      const BladeReach blade(test::plane_blade(l.origin, {1, 0, 0}, l.spacing), l.origin);
+      EXPECT_FALSE(device->find_near(u, blade, {}).finite);
+    }
+  }
 }
 
 TEST(MirrorUpdates, ABodyThatIsTooLargeForTheDeviceIsAnErrorAndTheCpuTakesIt) {

@@ -8,7 +8,9 @@
 #include <array>
 #include <map>
 #include <set>
+#include <string>
 
+#include "core/base/error.hpp"
 #include "core/levels/colours.hpp"
 #include "core/levels/corners.hpp"
 #include "core/levels/hierarchy.hpp"
@@ -375,6 +377,17 @@ TEST(Levels, CoarseComponentIsHeldIffAllThatItMovesAreHeld) {
           std::count_if(expected.begin(), expected.end(), [](auto bits) { return bits != 0; }));
     }
     EXPECT_GT(held, 0);
+  }
+}
+
+TEST(Levels, MoreCellsThanCornersHaveNumbersForAreAnErrorThatSaysHowManyMayBe) {
+  EXPECT_NO_THROW(check_cell_count(268435455));
+  try {
+    check_cell_count(268435456);
+    FAIL() << "their corners have no numbers";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::unavailable);
+    EXPECT_NE(std::string(error.what()).find("at most 268435455"), std::string::npos);
   }
 }
 
