@@ -30,7 +30,7 @@ struct MirrorOptions {
   ThreadOrder order = ThreadOrder::rising;
   std::size_t memory = std::size_t{1} << 34;  ///< bytes; beyond, allocations fail
   std::size_t allocations = ~std::size_t{0};  ///< that succeed; all further ones fail
-  gpu::DeviceOptions backend;
+  gpu::DeviceOptions backend = {};
 };
 
 class MirrorDevice {
