@@ -27,7 +27,7 @@ enum VectorId : int {
   kResidual,   ///< f - A u (on the fast backend where it is asked for, not of a cycle)
   kDirection,  ///< of a recursion: Chebyshev (not of the fast backend), Lanczos
   kScratch,    ///< product of the Chebyshev recursion and of the Krylov methods
-  kKrylovX,    ///< two vectors of the K-cycle
+  kKrylovX,    ///< two vectors of the K-cycle; `smooth` on level 0 may leave anything in the first
   kKrylovV,
   kLevelVectors
 };
@@ -74,10 +74,9 @@ struct CycleOptions;  // core/solve/cycle.hpp
 /// Fixed components take no part: operators read them as zero and leave zero in them.
 /// Needs load() before all else but set_smoother and add_vector, and levels and vectors that are
 /// there; numbers of them are not checked.
-/// @throws Error from any call if memory or the device fails. What is missing is then told by its
-/// kind: after one of memory (unavailable) read and read_rotations still give the vectors and
-/// rotations of level 0, but for what that call was to write, with the sizes of before if the call
-/// was an update; after a load nothing. Else the object is unusable.
+/// @throws Error from any call if the device fails; the object is then unusable. After OutOfMemory
+/// read and read_rotations still give the vectors and rotations of level 0, but for what that call
+/// was to write, with the sizes of before if the call was an update; not after a load.
 class Backend {
  public:
   virtual ~Backend() = default;

@@ -92,7 +92,7 @@ class Simulation {
   StepReport step();
   void on_progress(Progress progress);
   /// What to go on with where a cut, or the first solve after one, asks the backend for memory that
-  /// it does not have (Error, unavailable): the state moves over, a warning says so, and the step
+  /// it does not have (OutOfMemory): the state moves over, a warning says so, and the step
   /// goes on. Taken once. Without a fallback the step throws.
   void set_fallback(Fallback make);
 

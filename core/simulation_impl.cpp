@@ -144,9 +144,9 @@ void Simulation::Impl::move_surface() {
   if (!surface) return;
   try {
     place_surface();
-  } catch (const Error& error) {
-    if (!may_change_backend(error)) throw;
-    change_backend(error, read_state(finest().vertices(), finest().cells()));
+  } catch (const OutOfMemory& error) {
+    if (fallback == nullptr) throw;
+    change_backend(error, rescue(error, finest().vertices(), finest().cells()));
     place_surface();
   }
 }
@@ -207,9 +207,9 @@ DeformedLeaves Simulation::Impl::find_leaves(const TriangleMesh& blade) {
   };
   try {
     return find();
-  } catch (const Error& error) {
-    if (!may_change_backend(error)) throw;
-    change_backend(error, read_state(finest().vertices(), finest().cells()));
+  } catch (const OutOfMemory& error) {
+    if (fallback == nullptr) throw;
+    change_backend(error, rescue(error, finest().vertices(), finest().cells()));
     return find();
   }
 }
@@ -249,10 +249,10 @@ void Simulation::Impl::follow_structure(bool in_place, KeptState kept) {
     bool is_told = false;
     try {
       return update_backend(is_told);
-    } catch (const Error& error) {
-      if (!may_change_backend(error)) throw;
-      kept = is_told ? read_state(finest().vertices(), finest().cells())
-                     : read_state(change.vertices_before, change.cells_before);
+    } catch (const OutOfMemory& error) {
+      if (fallback == nullptr) throw;
+      kept = is_told ? rescue(error, finest().vertices(), finest().cells())
+                     : rescue(error, change.vertices_before, change.cells_before);
       for (auto& values : kept.vectors) values.resize(3 * at(change.vertices_before));
       kept.rotations.resize(4 * at(change.cells_before));
       follow_cut(kept);
@@ -264,8 +264,8 @@ void Simulation::Impl::follow_structure(bool in_place, KeptState kept) {
   try {
     load_structure();
     write_state(kept);
-  } catch (const Error& error) {
-    if (!may_change_backend(error)) throw;
+  } catch (const OutOfMemory& error) {
+    if (fallback == nullptr) throw;
     change_backend(error, kept);
   }
 }
@@ -308,26 +308,41 @@ void Simulation::Impl::write_state(const KeptState& kept) {
   backend->write_rotations(kept.rotations);
 }
 
-bool Simulation::Impl::may_change_backend(const Error& error) const {
-  return error.kind() == ErrorKind::unavailable && fallback != nullptr;
+// What a backend without memory still holds. Where it does not, the first error is the one to tell.
+KeptState Simulation::Impl::rescue(const OutOfMemory& error, std::int32_t vertices,
+                                   std::int32_t cells) const {
+  try {
+    return read_state(vertices, cells);
+  } catch (const Error& second) {
+    throw Error(second.kind(), text(error.what(), "; and then: ", second.what()));
+  }
 }
 
 // Goes on with the fallback, from a state of the structure as it is now.
-void Simulation::Impl::change_backend(const Error& error, const KeptState& kept) {
+void Simulation::Impl::change_backend(const OutOfMemory& error, const KeptState& kept) {
+  try {
+    take_fallback(error, kept);
+  } catch (const Error& second) {
+    throw Error(second.kind(), text(error.what(), "; and then: ", second.what()));
+  }
+}
+
+void Simulation::Impl::take_fallback(const OutOfMemory& error, const KeptState& kept) {
   std::unique_ptr<Backend> next = std::exchange(fallback, nullptr)();
   expects(next != nullptr, "the fallback of a simulation made no backend");
-  expects(has_incidences || !next->reads_incidences(),
-          text("the fallback of a simulation, backend ", next->name(),
-               ", reads incidences that were not kept for ", backend->name()));
+  expects(hierarchy().has_transfers() && (has_incidences || !next->reads_incidences()),
+          text("backend ", next->name(), " reads what was not kept for backend ", backend->name()));
   warnings.push_back(text(error.what(), "; goes on with backend ", next->name()));
   const SolverTimes& times = solver->times();
   earlier = {earlier.structure + times.structure, earlier.values + times.values,
              earlier.solve + times.solve};
+  const std::vector<double> returned = motion ? motion->returned() : std::vector<double>();
   motion.reset();
   equilibrium.reset();
   solver.reset();
   backend = std::move(next);
   make_solvers();
+  if (motion) motion->learn(returned);
   load_structure();
   write_state(kept);
 }
@@ -397,14 +412,15 @@ NonlinearStats Simulation::Impl::solve_once() {
   return motion ? motion->step() : equilibrium->solve(natural_time(), prescribed);
 }
 
-// Memory is asked for by the first solve of a structure. In statics any iterate may be gone on
-// from.
+// Memory is asked for by the first solve of a structure, before its first update is added. In
+// statics any iterate may be gone on from.
 NonlinearStats Simulation::Impl::solve_step() {
   try {
     return solve_once();
-  } catch (const Error& error) {
-    if (!may_change_backend(error) || (motion && !motion->rewind())) throw;
-    change_backend(error, read_state(finest().vertices(), finest().cells()));
+  } catch (const OutOfMemory& error) {
+    if (fallback == nullptr || (motion && !motion->rewind())) throw;
+    if (equilibrium) prescribed = equilibrium->rewind();
+    change_backend(error, rescue(error, finest().vertices(), finest().cells()));
     return solve_once();
   }
 }

@@ -45,8 +45,9 @@ struct Simulation::Impl {
   KeptState read_state(std::int32_t vertices, std::int32_t cells) const;
   void follow_cut(KeptState& kept) const;
   void write_state(const KeptState& kept);
-  bool may_change_backend(const Error& error) const;
-  void change_backend(const Error& error, const KeptState& kept);
+  KeptState rescue(const OutOfMemory& error, std::int32_t vertices, std::int32_t cells) const;
+  void change_backend(const OutOfMemory& error, const KeptState& kept);
+  void take_fallback(const OutOfMemory& error, const KeptState& kept);
   void change_surface(const CutEvent& event);
   void bind_surface();
   void move_surface();

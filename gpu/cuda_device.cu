@@ -15,14 +15,14 @@ std::string device_name(int number) {
 void check(cudaError_t status, const char* call, int device, std::size_t size) {
   if (status == cudaSuccess) return;
   cudaGetLastError();  // or the next launch would report it again
-  const char* remedy = status == cudaErrorMemoryAllocation
-                           ? "; lower body.resolution or solver.coarsest_vertices, or set "
-                             "solver.backend = \"cpu\""
-                           : "";
-  throw Error(
-      ErrorKind::unavailable,
+  const std::string what =
       text("CUDA: ", call, size > 0 ? text(" of size ", size) : std::string(), " failed on device ",
-           device, " (", device_name(device), "): ", cudaGetErrorString(status), remedy));
+           device, " (", device_name(device), "): ", cudaGetErrorString(status));
+  if (status == cudaErrorMemoryAllocation)
+    throw OutOfMemory(what +
+                      "; lower body.resolution or solver.coarsest_vertices, or set "
+                      "solver.backend = \"cpu\"");
+  throw Error(ErrorKind::unavailable, what);
 }
 
 CudaDevice::CudaDevice(int number) : number_(number) {

@@ -19,7 +19,8 @@
 
 namespace kerf::gpu {
 
-/// @throws Error (unavailable) that names the call, the size, the device and what CUDA says.
+/// @throws Error (unavailable), OutOfMemory where it is that, which names the call, the size, the
+/// device and what CUDA says.
 void check(cudaError_t status, const char* call, int device, std::size_t size = 0);
 
 inline constexpr int kThreads = 128;  // of a block
@@ -32,7 +33,8 @@ __global__ void run_body(std::int32_t count, const Body body) {
 
 /// A body of bodies/blocks.hpp, a block of threads a block.
 template <class Body>
-__global__ void __launch_bounds__(Body::kThreads) run_blocks(const Body body) {
+__global__ void __launch_bounds__(Body::kThreads, Body::kBlocksAtOnce) run_blocks(const Body body) {
+  static_assert(sizeof(typename Body::Shared) <= std::size_t{48} << 10, "all that is static");
   __shared__ typename Body::Shared shared;
   typename Body::State state{};
   const auto block = static_cast<std::int32_t>(blockIdx.x);

@@ -4,7 +4,7 @@
 //
 // A device is a class of its own and no interface, since launches are templates:
 //
-//   void* allocate(bytes)            throws Error (unavailable); the memory holds anything
+//   void* allocate(bytes)            throws OutOfMemory; the memory holds anything
 //   void release(at, bytes) noexcept
 //   void upload(to, from, bytes)     from the host; `from` may change as soon as this returns
 //   void download(to, from, bytes)   to the host; waits for all that was asked for before
@@ -83,9 +83,9 @@ class DeviceArray {
   /// Nothing is kept.
   void assign(std::size_t size) {
     if (size > capacity_) {
-      const std::size_t wanted = grown(size);
+      std::size_t wanted = grown(size);
       reset();
-      data_ = static_cast<T*>(device_->allocate(wanted * sizeof(T)));
+      data_ = allocate(size, wanted);
       capacity_ = wanted;
     }
     size_ = size;
@@ -94,8 +94,8 @@ class DeviceArray {
   /// Room for so many. What was there is kept, also where there is no memory for more.
   void reserve(std::size_t size) {
     if (size <= capacity_) return;
-    const std::size_t wanted = grown(size);
-    T* const moved = static_cast<T*>(device_->allocate(wanted * sizeof(T)));
+    std::size_t wanted = grown(size);
+    T* const moved = allocate(size, wanted);
     if (size_ > 0) device_->copy(moved, data_, size_ * sizeof(T));
     const std::size_t kept = size_;
     reset();
@@ -124,6 +124,17 @@ class DeviceArray {
   }
 
  private:
+  // Without room to grow where there is no memory for it.
+  T* allocate(std::size_t size, std::size_t& wanted) {
+    if (wanted > size) {
+      try {
+        return static_cast<T*>(device_->allocate(wanted * sizeof(T)));
+      } catch (const OutOfMemory&) {
+        wanted = size;
+      }
+    }
+    return static_cast<T*>(device_->allocate(size * sizeof(T)));
+  }
   // The first time exactly, then by a quarter at least; memory of a device is dear.
   std::size_t grown(std::size_t size) const {
     return capacity_ == 0 ? size : std::max(size, capacity_ + capacity_ / 4);

@@ -49,8 +49,9 @@ struct DeviceInverse {
         slices(device) {}
 
   std::int32_t unknowns = 0;
-  DeviceArray<Device, double> cells;     ///< matrices of level 0 where that is the coarsest
-  DeviceArray<Device, double> matrix;    ///< of S double the inverse at last; else given back
+  DeviceArray<Device, double> cells;  ///< matrices of level 0 where that is the coarsest
+  DeviceArray<Device, double>
+      matrix;  ///< of S double the inverse at last; kept, so that no later factor asks for memory
   DeviceArray<Device, double> diagonal;  ///< before the elimination
   DeviceArray<Device, double> panels;    ///< two of kBlock rows, P, and whether a pivot was lost
   DeviceArray<Device, S> inverse;        ///< of S float
@@ -206,7 +207,8 @@ class DeviceBackend final : public Backend {
     return reinterpret_cast<T*>(records_.data());
   }
   bool in_blocks() const {
-    return options_.blocks && blocks_.most_cells() <= options_.most_block_cells;
+    constexpr std::size_t kMost = 8191;  // codes have 16 bits
+    return options_.blocks && blocks_.most_cells() <= std::min(options_.most_block_cells, kMost);
   }
   template <class T, class Cells, class Then>
   void gather_by_records(int level, const Cells& cells, const Then& then) const;

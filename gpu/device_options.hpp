@@ -9,7 +9,7 @@ namespace kerf::gpu {
 struct DeviceOptions {
   bool updates = true;  ///< false: loads anew after each cut
   bool blocks = true;   ///< false: products of level 0 by records
-  /// Records as well where more cells lie around a block of vertices; codes have 16 bits.
+  /// Records as well where more cells lie around a block of vertices; at most 8191.
   std::size_t most_block_cells = 8191;
 };
 

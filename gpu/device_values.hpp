@@ -366,7 +366,6 @@ bool DeviceBackend<Device, S>::invert_coarsest() {
     if (coarsest_.inverse.capacity() < at(n) * at(n)) cycle_.reset();
     coarsest_.inverse.assign(at(n) * at(n));
     run(n * n, CopyBody<double, S>{A, coarsest_.inverse.data()});
-    coarsest_.matrix.reset();
   }
   return true;
 }

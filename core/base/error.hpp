@@ -31,6 +31,14 @@ class Error : public std::runtime_error {
   std::source_location where_;
 };
 
+/// Not enough memory of a device: what was there is there still.
+class OutOfMemory : public Error {
+ public:
+  explicit OutOfMemory(const std::string& message,
+                       std::source_location where = std::source_location::current())
+      : Error(ErrorKind::unavailable, message, where) {}
+};
+
 /// Joins anything that a stream can print into one string.
 template <class... Parts>
 std::string text(const Parts&... parts) {

@@ -170,6 +170,12 @@ void Equilibrium::go_to_best() {
   stats_.residual = residual();
 }
 
+// One step back may be no place any more: the increment is being found anew.
+bool Equilibrium::rewind() {
+  if (best_at_ == Best::kept) backend_.copy(0, best_, state_.displacement);
+  return keep_rotations_;
+}
+
 NonlinearStats Equilibrium::solve(double natural_time, bool keep_rotations) {
   stats_ = {};
   keep_rotations_ = keep_rotations;

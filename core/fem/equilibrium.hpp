@@ -29,6 +29,9 @@ class Equilibrium {
   /// `keep_rotations`: the first update takes the rotations as they are, so that prescribed
   /// displacements spread over the body before any rotation is extracted.
   NonlinearStats solve(double natural_time, bool keep_rotations);
+  /// After a solve that threw: the best iterate that was kept, else that of the moment. Returns
+  /// whether the next solve is still to keep the rotations.
+  bool rewind();
   /// Gives the memory of vectors that hold nothing between solves back until the next one.
   void release();
   void on_progress(Progress progress) { progress_ = std::move(progress); }

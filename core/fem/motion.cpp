@@ -139,11 +139,13 @@ NonlinearStats Motion::lost(NonlinearStats stats, int updates, bool last_is_lost
   return stats;
 }
 
-// begin_step backwards. Newmark: v' = -v and a' = -a - v / (beta dt), as lost() says; the velocity
-// of the central scheme is found anew.
+// begin_step backwards; it asks for memory before it changes what the state is made of. Newmark: v'
+// = -v and a' = -a - v / (beta dt), as lost() says; the velocity of the central scheme is found
+// anew.
 bool Motion::rewind() {
   static_assert(kGamma == 2 * kBeta && kBeta == 0.25);
-  if (!std::exchange(is_begun_, false)) return false;
+  const At at = std::exchange(at_, At::updated);
+  if (at != At::begun) return at == At::before;
   const double dt = time_.step;
   if (time_.scheme == TimeScheme::newmark) {
     backend_.combine(0, -1, state_.velocity, 0, state_.velocity);
@@ -172,9 +174,9 @@ double Motion::residual(int out) {
 
 NonlinearStats Motion::step() {
   NonlinearStats stats;
-  is_begun_ = false;
+  at_ = At::before;
   begin_step();
-  is_begun_ = true;
+  at_ = At::begun;
   backend_.set_operator({1 + material_.stiffness_damping * velocity_factor(),
                          acceleration_factor() + material_.mass_damping * velocity_factor()});
   double reference = 0, previous = 0;  // residual before the first update, and the one just made
@@ -198,7 +200,7 @@ NonlinearStats Motion::step() {
     ++stats.rotation_updates;
     if (!std::isfinite(solve.residual)) return lost(stats, update, false);
     keep_way_back();
-    is_begun_ = false;
+    at_ = At::updated;
     move(1);
     backend_.add(0, acceleration_factor(), increment_, acceleration_);
   }

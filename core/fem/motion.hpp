@@ -8,6 +8,7 @@
 // Source  [DGW11] section 5; [WWD15] appendix A.4, equations 46 to 48.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "core/solve/linear_solver.hpp"
@@ -44,6 +45,9 @@ class Motion {
   /// After a step that threw: the state of before it, but for rounding. Returns false, and changes
   /// nothing, where an update had been added already.
   bool rewind();
+  /// What the last step has taught this one; for a motion that goes on with another backend.
+  const std::vector<double>& returned() const { return returned_; }
+  void learn(std::vector<double> returned) { returned_ = std::move(returned); }
 
  private:
   // Coefficients of u_{n+1} in velocity and acceleration.
@@ -66,7 +70,7 @@ class Motion {
   int acceleration_, right_, increment_, work_, scratch_;
   StateVectors far_;  // displacement and velocity before the last update, if it went far
   bool is_far_ = false;
-  bool is_begun_ = false;         // and no update was added
+  enum class At { before, begun, updated } at_ = At::updated;  // in a step
   std::vector<double> returned_;  // per update: the residual after it over that before it, when the
                                   // rotations had moved, in the last step
   double largest_force_ = 0;      // of the terms of the last residual

@@ -48,12 +48,12 @@ struct WriteCodes {
 
 /// then(level, vertex, sum) with the sum of what the cells around each vertex add to it.
 ///
-/// Shapes  as many threads a block as kBlockVertices; a thread a cell of the chunk in even phases,
-/// a
-///         thread a vertex in odd ones.
+/// Shapes  a thread a vertex of the block in odd phases, a thread a cell of the chunk in even ones.
 template <class T, class Cells, class Then>
 struct BlockGather {
   static constexpr int kThreads = kBlockVertices;
+  /// Of a multiprocessor, so that some work while others wait: what registers are shared out for.
+  static constexpr int kBlocksAtOnce = sizeof(T) == sizeof(double) ? 2 : 3;
   struct Shared {
     T entry[kUnknowns][kThreads];
   };

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 //
 // Coarse matrices: six threads a coarse cell, one for each pair of components, whose 64 scalars
-// stay in registers (kernels/component_coarsen.hpp). Threads side by side have cells side by side.
-// Plain cells, most of them, have bodies of their own, without weights; the others loop over
-// weights.
+// fit into registers (kernels/component_coarsen.hpp; in double those of stored children spill).
+// Threads side by side have cells side by side. Plain cells, most of them, have bodies of their
+// own, without weights; the others loop over weights.
 #pragma once
 
 #include "gpu/bodies/values.hpp"

@@ -25,10 +25,10 @@ box = [[-1, -1, -1], [1, 0.001, 1]]
                          "scene.toml", {"solver.backend=" + backend});
 }
 
-/// A device that is too small for anything.
+/// A device that is too small for any body.
 std::unique_ptr<Backend> small_device() {
   test::MirrorOptions options;
-  options.memory = std::size_t{600} << 10;
+  options.memory = std::size_t{410} << 10;
   return test::make_mirror_backend(false, options);
 }
 

@@ -343,6 +343,18 @@ TEST(MirrorSolve, CycleIsRecordedOnceForAllValuesOfOneStructure) {
   EXPECT_EQ(counters_of(backend).recordings, 1u);
 }
 
+// So that a factor that is due in the middle of a solve does not end a run for want of memory.
+TEST(MirrorSolve, ASecondFactorAsksForNoMemory) {
+  const Problem p = cut_octree();
+  for (const bool single : {false, true}) {
+    const Loaded mirror(p, make_mirror_backend(single), kDynamic, {}, p.deformation());
+    mirror.backend->factor_coarsest();
+    const std::size_t before = counters_of(*mirror.backend).allocations;
+    mirror.backend->factor_coarsest();
+    EXPECT_EQ(counters_of(*mirror.backend).allocations, before);
+  }
+}
+
 TEST(MirrorSolve, LooseBodyIsAnErrorThatNamesTheRemedy) {
   for (const bool single : {false, true}) {
     ProblemOptions options;

@@ -15,7 +15,7 @@ void* MirrorDevice::allocate(std::size_t bytes) {
   ensures(!recording_, "memory is allocated while a graph is recorded");
   if (counters_.bytes_held + bytes > options_.memory ||
       counters_.allocations == options_.allocations)
-    throw Error(ErrorKind::unavailable, text("the mirror has no ", bytes, " bytes left"));
+    throw OutOfMemory(text("the mirror has no ", bytes, " bytes left"));
   void* const at = std::malloc(std::max<std::size_t>(bytes, 1));
   std::memset(at, kPoison, bytes);
   held_[at] = bytes;

@@ -32,6 +32,8 @@ inline std::unique_ptr<Backend> make_backend(const std::string& name, int thread
   if (name == "mirror_mixed") return make_mirror_backend(true);
   if (name == "cuda" || name == "cuda_mixed")
     return make_cuda_backend({.device = 0, .single_cycle = name == "cuda_mixed"});
+  if (name == "cuda_records" || name == "cuda_mixed_records")
+    return make_cuda_backend({.single_cycle = name == "cuda_mixed_records", .records = true});
   return nullptr;
 }
 
