@@ -18,6 +18,7 @@ namespace {
 using test::counters_of;
 using test::make_mirror_backend;
 using test::MirrorOptions;
+using test::worst_distance;
 
 /// A block that sags and is cut in two of its steps.
 SimulationSetup block(TimeMode mode, TimeScheme scheme, int refinement) {
@@ -41,15 +42,6 @@ SimulationSetup block(TimeMode mode, TimeScheme scheme, int refinement) {
   setup.cuts = {cut};
   setup.surface = SurfaceMethod::dual_contouring;
   return setup;
-}
-
-double worst_distance(const Simulation& a, const Simulation& b) {
-  const auto left = a.deformed_corners(), right = b.deformed_corners();
-  EXPECT_EQ(left.size(), right.size());
-  double worst = 0;
-  for (std::size_t i = 0; i < std::min(left.size(), right.size()); ++i)
-    worst = std::max(worst, norm(left[i] - right[i]));
-  return worst;
 }
 
 double worst_velocity(const Simulation& a, const Simulation& b) {

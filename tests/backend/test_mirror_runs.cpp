@@ -21,6 +21,7 @@ using test::make_mirror_backend;
 using test::MirrorOptions;
 using test::Problem;
 using test::ProblemOptions;
+using test::worst_distance;
 
 /// A block that sags and is cut on its way.
 SimulationSetup block(int refinement) {
@@ -39,15 +40,6 @@ SimulationSetup block(int refinement) {
   cut.lines = {{{0.53, 1.5, -1}, {0.57, 1.6, 2}}, {{0.48, 0.4, -1}, {0.52, 0.5, 2}}};
   setup.cuts = {cut};
   return setup;
-}
-
-double worst_distance(const Simulation& a, const Simulation& b) {
-  const auto left = a.deformed_corners(), right = b.deformed_corners();
-  EXPECT_EQ(left.size(), right.size());
-  double worst = 0;
-  for (std::size_t i = 0; i < std::min(left.size(), right.size()); ++i)
-    worst = std::max(worst, norm(left[i] - right[i]));
-  return worst;
 }
 
 TEST(MirrorRuns, UpdatesAndLoadsGiveTheSameBits) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -21,6 +22,15 @@ inline std::unique_ptr<Backend> cpu(int threads = 1) { return make_cpu_backend({
 
 inline std::shared_ptr<const Solid> box_solid(const Vec3d& size) {
   return make_box({{0, 0, 0}, size});
+}
+
+/// Between the corners of two runs, m; infinite where they have not as many.
+inline double worst_distance(const Simulation& a, const Simulation& b) {
+  const std::vector<Vec3d> left = a.deformed_corners(), right = b.deformed_corners();
+  double worst = left.size() == right.size() ? 0 : std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < std::min(left.size(), right.size()); ++i)
+    worst = std::max(worst, norm(left[i] - right[i]));
+  return worst;
 }
 
 using Rotation = kernels::Quat<double>;
