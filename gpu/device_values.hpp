@@ -242,11 +242,11 @@ void DeviceBackend<Device, S>::coarsen(int fine) {
   if (fine == 0) {
     const FinestView<S> finest = finest_view<S>(scales_.data());
     run(tasks, CoarsenFinestPlain<S>{from, to, finest, plain, matrices});
-    run(tasks, CoarsenFinestOther<S>{from, to, finest, plain, matrices});
+    run(tasks, CoarsenSums<S, FinestChildren<S>>{from, to, {finest}, plain, matrices});
   } else {
     const S* const stored = level_at(fine).matrices.data();
-    run(tasks, CoarsenStoredPlain<S>{from, to, stored, plain, matrices});
-    run(tasks, CoarsenStoredOther<S>{from, to, stored, plain, matrices});
+    run(tasks, CoarsenSums<S, StoredChildren<S, true>>{from, to, {stored}, plain, matrices});
+    run(tasks, CoarsenSums<S, StoredChildren<S, false>>{from, to, {stored}, plain, matrices});
   }
 }
 

@@ -6,8 +6,8 @@
 // incidences, as those of records have (products.hpp), and so the same bits.
 //
 // Per vertex of a uniform body in single precision, counted: cells 6, codes 16, row 12, slots 32,
-// fold 2, rotation 16, values 12, u and the result 24, some 130 bytes from memory with what the
-// blocks' edges add, in place of some 330; for 1.6 times the arithmetic.
+// fold 2, rotation 16, kind 2, u and the result 24, some 105 bytes from memory where the edges of
+// blocks are found in caches, in place of some 330; for 1.6 times the arithmetic.
 //
 // A body of blocks has `Shared`, which a block shares and finds filled with anything, `State`, one
 // a thread and made anew for each block, phases(block), and operator()(phase, block, thread,

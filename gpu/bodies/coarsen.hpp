@@ -119,26 +119,36 @@ struct CoarsenFinestPlain {
   }
 };
 
-/// The others of level 1.
-template <class T>
-struct CoarsenFinestOther {
+/// Sums over children, of plain cells or of the others as `Children::kPlain` says;
+/// children.add(fine, coarse, child, task, sum).
+template <class T, class Children>
+struct CoarsenSums {
   LevelView fine, coarse;
-  FinestView<T> finest;
+  Children children;
   const std::uint8_t* plain;
   T* matrices;
 
   KERF_HD void operator()(std::int32_t i) const {
     const CoarsenTask task = coarsen_task(i);
-    if (task.cell >= coarse.cells || plain[task.cell] != 0) return;
-    Component<T> sum = {};
+    if (task.cell >= coarse.cells || (plain[task.cell] != 0) != Children::kPlain) return;
+    Component<T> sum;
+    kernels::unrolled<kCorners>(
+        [&](auto p) { kernels::unrolled<kCorners>([&](auto q) { sum[p][q] = T(0); }); });
     const std::int32_t begin = coarse.child_begin[task.cell];
     for (std::int32_t k = begin; k < begin + coarse.child_count[task.cell]; ++k)
-      add(coarse.children[k], task, sum);
+      children.add(fine, coarse, coarse.children[k], task, sum);
     store_component(matrices, task.cell, task.pair, sum);
   }
+};
 
- private:
-  KERF_HD void add(std::int32_t child, const CoarsenTask& task, Component<T>& sum) const {
+/// The others of level 1.
+template <class T>
+struct FinestChildren {
+  static constexpr bool kPlain = false;
+  FinestView<T> finest;
+
+  KERF_HD void add(const LevelView& fine, const LevelView& coarse, std::int32_t child,
+                   const CoarsenTask& task, Component<T>& sum) const {
     T forces[10];
     Component<T> A, left, right;
     finest_forces(finest, child, task.pair, forces);
@@ -156,54 +166,26 @@ struct CoarsenFinestOther {
   }
 };
 
-/// Plain cells of a higher level.
-template <class T>
-struct CoarsenStoredPlain {
-  LevelView fine, coarse;
-  const T* from;
-  const std::uint8_t* plain;
-  T* matrices;
+/// Plain cells of a higher level, and the others.
+template <class T, bool plain>
+struct StoredChildren {
+  static constexpr bool kPlain = plain;
+  const T* matrices;
 
-  KERF_HD void operator()(std::int32_t i) const {
-    const CoarsenTask task = coarsen_task(i);
-    if (task.cell >= coarse.cells || plain[task.cell] == 0) return;
-    Component<T> sum;
-    kernels::unrolled<kCorners>(
-        [&](auto p) { kernels::unrolled<kCorners>([&](auto q) { sum[p][q] = T(0); }); });
-    const std::int32_t begin = coarse.child_begin[task.cell];
-    for (std::int32_t k = begin; k < begin + coarse.child_count[task.cell]; ++k) {
-      Component<T> A;
-      load_component(from, coarse.children[k], task.pair, A);
-      kernels::restrict_component(fine.place[coarse.children[k]], A);
+  KERF_HD void add(const LevelView& fine, const LevelView& coarse, std::int32_t child,
+                   const CoarsenTask& task, Component<T>& sum) const {
+    Component<T> A;
+    load_component(matrices, child, task.pair, A);
+    if constexpr (plain) {
+      kernels::restrict_component(fine.place[child], A);
       kernels::unrolled<kCorners>(
           [&](auto p) { kernels::unrolled<kCorners>([&](auto q) { sum[p][q] += A[p][q]; }); });
-    }
-    store_component(matrices, task.cell, task.pair, sum);
-  }
-};
-
-/// The others of a higher level.
-template <class T>
-struct CoarsenStoredOther {
-  LevelView fine, coarse;
-  const T* from;
-  const std::uint8_t* plain;
-  T* matrices;
-
-  KERF_HD void operator()(std::int32_t i) const {
-    const CoarsenTask task = coarsen_task(i);
-    if (task.cell >= coarse.cells || plain[task.cell] != 0) return;
-    Component<T> sum = {};
-    const std::int32_t begin = coarse.child_begin[task.cell];
-    for (std::int32_t k = begin; k < begin + coarse.child_count[task.cell]; ++k) {
-      const std::int32_t child = coarse.children[k];
-      Component<T> A, weights;
-      load_component(from, child, task.pair, A);
+    } else {
+      Component<T> weights;
       kernels::transfer_weights(fine.fold[child], fine.place[child], coarse.fold[task.cell],
                                 weights);
       kernels::add_weighted(A, weights, weights, sum);
     }
-    store_component(matrices, task.cell, task.pair, sum);
   }
 };
 
