@@ -39,8 +39,12 @@ void Machine::load() {
   }
   backend_->write(0, bent, body_.bent(1));
   backend_->rotate_cells(bent);
+  find_values(body_.hierarchy());
+}
+
+void Machine::find_values(const Hierarchy& hierarchy) {
   backend_->prepare(0);
-  for (int level = 0; level + 1 < levels(); ++level) {
+  for (int level = 0; level + 1 < static_cast<int>(hierarchy.levels.size()); ++level) {
     backend_->coarsen(level);
     backend_->prepare(level + 1);
   }

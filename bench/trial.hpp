@@ -26,6 +26,8 @@ class Machine {
 
   /// Topology, vectors, rotations, matrices, factor: whatever a phase left behind is gone.
   void load();
+  /// Matrices, diagonals and factor, of the rotations that there are, on what was loaded last.
+  void find_values(const Hierarchy& hierarchy);
 
   Backend& backend() { return *backend_; }
   const Backend& backend() const { return *backend_; }

@@ -102,12 +102,7 @@ void run_frame(Trial& t) {
   const Hierarchy& hierarchy = t.structure->hierarchy();
   const int levels = static_cast<int>(hierarchy.levels.size());
   b.rotate_cells(t.machine.bent);
-  b.prepare(0);
-  for (int level = 0; level + 1 < levels; ++level) {
-    b.coarsen(level);
-    b.prepare(level + 1);
-  }
-  b.factor_coarsest();
+  t.machine.find_values(hierarchy);
   b.copy(0, t.machine.load_vector, kRight);
   b.zero(0, kSolution);
   Cycle cycle(b, levels, cycle_options(t.candidate.solver, hierarchy));

@@ -15,7 +15,6 @@ namespace {
 // A bar along x, cut across. Its weight pulls towards +x: one half hangs from its end, the other
 // stands on its own.
 constexpr double kBarLength = 4;
-constexpr Elastic kMaterial{1000, 0.3, 1};
 
 struct CutBar {
   HangingBar halves[2];

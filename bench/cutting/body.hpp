@@ -34,6 +34,8 @@ struct Elastic {
   double poisson = 0;  ///< in (-1, 0.5)
   double density = 1;  ///< kg/m^3
 };
+/// Of all scenes whose answer says nothing about the material.
+inline constexpr Elastic kMaterial{1000, 0.3, 1};
 
 /// A box of whole cells, the blades that pass through it in their order, in the reference state.
 struct Shape {

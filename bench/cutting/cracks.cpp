@@ -12,7 +12,6 @@
 namespace kerf::cutting {
 namespace {
 
-constexpr Elastic kMaterial{1000, 0.3, 1};
 constexpr double kRadius = 1, kPressure = 1;
 
 /// A round crack in the middle of a box that is twice as wide in every direction. The exact

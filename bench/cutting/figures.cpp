@@ -13,8 +13,6 @@
 namespace kerf::cutting {
 namespace {
 
-constexpr double kSolved = 1e-8;  // what the linear solver leaves is less
-
 // ---- tables
 
 std::string number(const char* format, double value) {

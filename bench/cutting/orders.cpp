@@ -11,8 +11,6 @@
 namespace kerf::cutting {
 namespace {
 
-constexpr Elastic kMaterial{1000, 0.3, 1};
-
 struct Answer {
   double deflection = 0, energy = 0;
 };

@@ -26,9 +26,8 @@ const Record* find(const std::vector<Record>& all, const Record& like, int below
   return out;
 }
 
-// Errors of the linear solver have no order.
+// Errors that the linear solver leaves have no order.
 double order_between(double coarse, double fine, double ratio) {
-  constexpr double kSolved = 1e-8;
   return coarse > kSolved && fine > kSolved ? std::log(coarse / fine) / std::log(ratio) : kNone;
 }
 

@@ -15,6 +15,8 @@ namespace kerf::cutting {
 
 /// What a scene does not have is no number, and null in the file.
 inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+/// What the linear solver leaves of an error is less.
+inline constexpr double kSolved = 1e-8;
 
 /// One of several answers: a half, an angle, an order of cuts.
 struct Part {

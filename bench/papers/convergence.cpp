@@ -9,8 +9,8 @@
 namespace kerf::papers {
 namespace {
 
-constexpr const char* kName = "figure10";
-constexpr int kCycles = 30;
+constexpr const char* kFigure10 = "figure10";
+constexpr int kLongest = 30;
 constexpr double kFloor = 1e-9;  // below it, what the solution itself is off may show
 constexpr double kTurn = std::numbers::pi / 6;
 constexpr int kBlades = 7;  // in each direction: those that give the printed number of cells
@@ -25,28 +25,29 @@ void add_course(Context& context, const char* panel, const std::string& series,
                 const Course& course) {
   for (const Sample& s : course.samples)
     context.results.points.push_back(
-        {kName, panel, series, static_cast<double>(s.cycle), s.error, false});
+        {kFigure10, panel, series, static_cast<double>(s.cycle), s.error, false});
 }
 
 // Cycles of the paper's solver.
 void run_case(Context& context, const Problem& problem, double density, const char* panel,
               const Case& one) {
-  context.doing(text(kName, ": ", one.name));
+  context.doing(text(kFigure10, ": ", one.name));
   std::vector<double> solution;
   {
     Machine fast(problem, fast_backend(context.all_threads), density);
     fast.find_solution();
     solution = fast.solution();
-    const Course course = fast.run(default_solver(), {kCycles, 0, kFloor});
-    context.results.add({kName, one.name, kKerfMethod, "rate", "1", kNone, course.rate(kFloor)});
+    const Course course = fast.run(default_solver(), {kLongest, 0, kFloor});
+    context.results.add(
+        {kFigure10, one.name, kKerfMethod, "rate", "1", kNone, course.rate(kFloor)});
     add_course(context, panel, one.name + ": Kerf", course);
   }
   Machine plain(problem, reference_backend(context.all_threads), density);
   plain.take_solution(std::move(solution));
-  const Course course = plain.run(paper_solver(), {kCycles, 0, kFloor});
+  const Course course = plain.run(paper_solver(), {kLongest, 0, kFloor});
   context.results.add(
-      {kName, one.name, kPaperMethod, "rate", "1", one.printed, course.rate(kFloor)});
-  context.results.add({kName, one.name, kPaperMethod, "error after three cycles", "1", kNone,
+      {kFigure10, one.name, kPaperMethod, "rate", "1", one.printed, course.rate(kFloor)});
+  context.results.add({kFigure10, one.name, kPaperMethod, "error after three cycles", "1", kNone,
                        course.error_after(3)});
   add_course(context, panel, one.name, course);
 }

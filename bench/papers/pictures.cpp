@@ -12,12 +12,12 @@
 namespace kerf::papers {
 namespace {
 
-constexpr const char* kName = "pictures";
+constexpr const char* kPictures = "pictures";
 
 void run_body(Context& context, const BodyInfo& info) {
   const std::optional<SimulationSetup> setup = setup_of(context, info, Grid::adaptive);
   if (!setup) return;
-  context.doing(text(kName, ": ", info.name));
+  context.doing(text(kPictures, ": ", info.name));
   std::unique_ptr<Backend> backend = fast_backend(context.threads);
   const Problem problem(*setup, backend.get());
   Machine machine(problem, std::move(backend), 1);
@@ -25,7 +25,7 @@ void run_body(Context& context, const BodyInfo& info) {
   const double step = machine.step_seconds(default_solver(), context.repeat);
   const auto add = [&](const char* quantity, const char* unit, double printed, double ours,
                        const char* method = "") {
-    context.results.add({kName, info.name, method, quantity, unit, printed, ours});
+    context.results.add({kPictures, info.name, method, quantity, unit, printed, ours});
   };
   add("cells", "1", info.printed.cells, static_cast<double>(problem.cells_before()));
   add("cells after the cut", "1", info.printed.cut_cells, static_cast<double>(problem.cells()));
@@ -103,7 +103,7 @@ void run_rods(Context& context) {
   constexpr double kSideways = 1;  // m/s^2
   const bool is_small = context.size == bench::Size::small;
   for (const int count : is_small ? std::vector<int>{1, 3} : std::vector<int>{4, 7, 9}) {
-    context.doing(text(kName, ": rods between ", count, " blades"));
+    context.doing(text(kPictures, ": rods between ", count, " blades"));
     SimulationSetup setup = cube_with_comb(context.size, 0, count, 0);
     setup.time.mode = TimeMode::statics;
     setup.loads = {Gravity{{kSideways, 0, 0}}};
@@ -114,8 +114,8 @@ void run_rods(Context& context) {
     const double exact = rods.beam(setup.material, kSideways).tip();
     const double found = mean_deflection(problem, machine.solution(), rods);
     context.results.add(
-        {kName, text("rods between ", count, " blades"), "", "deflection", "m", kNone, found});
-    context.results.add({kName, text("rods between ", count, " blades"), "",
+        {kPictures, text("rods between ", count, " blades"), "", "deflection", "m", kNone, found});
+    context.results.add({kPictures, text("rods between ", count, " blades"), "",
                          "deflection of a clamped beam", "m", kNone, exact});
   }
 }

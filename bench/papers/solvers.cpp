@@ -7,7 +7,7 @@
 namespace kerf::papers {
 namespace {
 
-constexpr const char* kName = "figure12";
+constexpr const char* kFigure12 = "figure12";
 constexpr double kGoal = 1e-8;  // of the error
 // Its factor takes some 2 GB and half a minute there, and both grow faster than the body.
 constexpr std::size_t kMostForCholesky = 80000;
@@ -36,23 +36,23 @@ void add_points(Context& context, const std::string& panel, const char* solver,
     if (s.cycle > 2 && !is_end && s.seconds < kApart * last) continue;
     last = s.seconds;
     context.results.points.push_back(
-        {kName, panel, solver, s.seconds, s.error, &s == &course.samples.front()});
+        {kFigure12, panel, solver, s.seconds, s.error, &s == &course.samples.front()});
   }
 }
 
 void run_panel(Context& context, const SimulationSetup& setup, const std::string& panel,
                double density) {
-  context.doing(text(kName, ": ", panel));
+  context.doing(text(kFigure12, ": ", panel));
   const Problem problem(setup);
   Machine machine(problem, fast_backend(context.threads), density);
   machine.find_solution();
   context.results.add(
-      {kName, panel, "", "cells", "1", kNone, static_cast<double>(problem.cells())});
+      {kFigure12, panel, "", "cells", "1", kNone, static_cast<double>(problem.cells())});
   for (const Contestant& one : contestants(problem)) {
-    context.doing(text(kName, ": ", panel, ", ", one.name));
+    context.doing(text(kFigure12, ": ", panel, ", ", one.name));
     const Course course = machine.run(one.solver, {0, context.give_up, kGoal});
     const auto add = [&](const char* quantity, const char* unit, double value) {
-      context.results.add({kName, panel, one.name, quantity, unit, kNone, value});
+      context.results.add({kFigure12, panel, one.name, quantity, unit, kNone, value});
     };
     add("structural set-up", "s", course.structure);
     add("other set-up", "s", course.values);

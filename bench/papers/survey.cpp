@@ -9,8 +9,8 @@
 namespace kerf::papers {
 namespace {
 
-constexpr const char* kName = "survey";
-constexpr int kSweeps = 4, kCycles = 2;
+constexpr const char* kSurvey = "survey";
+constexpr int kSweeps = 4, kSurveyCycles = 2;
 
 /// Milliseconds on one core of a Xeon X5560 at 2.8 GHz.
 struct Column {
@@ -45,7 +45,7 @@ Values set_values(Backend& backend, int levels) {
 void run_column(Context& context, const BodyInfo& info, const Column& column) {
   const std::optional<SimulationSetup> setup = setup_of(context, info, column.grid);
   if (!setup) return;
-  context.doing(text(kName, ": ", column.name));
+  context.doing(text(kSurvey, ": ", column.name));
   std::unique_ptr<Backend> backend = fast_backend(context.threads);
   Backend& of_machine = *backend;
   const Problem problem(*setup, backend.get(), true);
@@ -55,13 +55,13 @@ void run_column(Context& context, const BodyInfo& info, const Column& column) {
   SolverSetup solver = method_solver(SolverMethod::multigrid);
   solver.cycle = CycleType::v;
   solver.pre_sweeps = solver.post_sweeps = kSweeps;
-  const Course course = machine.run(solver, {kCycles, 0, 0});
+  const Course course = machine.run(solver, {kSurveyCycles, 0, 0});
   const double solve =
       course.samples.back().seconds - course.samples.front().seconds - course.values;
 
   const CutTimes& cut = problem.cut_times();
   const auto add = [&](const char* quantity, const char* unit, double printed, double ours) {
-    context.results.add({kName, column.name, kKerfMethod, quantity, unit, printed, ours});
+    context.results.add({kSurvey, column.name, kKerfMethod, quantity, unit, printed, ours});
   };
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
   constexpr double kMilli = 1e3;
@@ -86,7 +86,7 @@ void run_column(Context& context, const BodyInfo& info, const Column& column) {
     sum_printed += printed[i];
   }
   add("all of the cut", "ms", sum_printed, sum);
-  add("error after two cycles", "1", kNone, course.error_after(kCycles));
+  add("error after two cycles", "1", kNone, course.error_after(kSurveyCycles));
 }
 
 }  // namespace

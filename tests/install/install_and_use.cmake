@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # cmake -DCLIENT= -DGENERATOR= -DMAKE= -DCXX= -DCXX_FLAGS= -DCONFIG= -DBUILD= -DWORK= [-DSOURCE=] -P this
 # Installs the Kerf of BUILD below WORK, and builds and runs CLIENT against it. With SOURCE, BUILD is
-# made first: the libraries alone, without SuiteSparse, many sources at once, optimised a little and
+# made first: the libraries alone, without SuiteSparse, for any machine, many sources at once, and
 # without symbols for a debugger, since another build compiles each alone and as it is released.
 set(how -G ${GENERATOR} -DCMAKE_MAKE_PROGRAM=${MAKE} -DCMAKE_BUILD_TYPE=${CONFIG}
   -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_FLAGS=${CXX_FLAGS})
@@ -23,7 +23,7 @@ if(SOURCE)
   run(${CMAKE_COMMAND} -S ${SOURCE} -B ${BUILD} ${how}
     -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 -DCMAKE_CXX_FLAGS_DEBUG=
     "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG"
-    -DKERF_SUITESPARSE=OFF -DKERF_APP=OFF -DKERF_TESTS=OFF -DKERF_BENCH=OFF)
+    -DKERF_NATIVE=OFF -DKERF_DISPATCH=OFF -DKERF_SUITESPARSE=OFF -DKERF_APP=OFF -DKERF_TESTS=OFF -DKERF_BENCH=OFF)
   run(${CMAKE_COMMAND} --build ${BUILD})
 endif()
 file(REMOVE_RECURSE ${WORK})
