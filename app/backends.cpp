@@ -21,10 +21,8 @@ const char* precision_name(Precision precision) {
 }
 
 std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
-  const char* precision = precision_name(solver.precision);
   expects(solver.precision != Precision::single,
-          text("solver.precision = \"", precision,
-               "\": \"double\" and \"mixed\" are available in this version"));
+          "solver.precision = \"single\": there are \"double\" and \"mixed\"");
   const bool mixed = solver.precision == Precision::mixed;
   const bool known = solver.backend == "cpu" || solver.backend == "auto" ||
                      solver.backend == "reference" || solver.backend == "cuda";

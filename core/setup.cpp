@@ -87,9 +87,10 @@ void validate(const SimulationSetup& setup) {
           "solver.tolerance must lie between 0 and 1");
   expects(solver.cycles >= 0 && solver.max_cycles >= 1 && solver.rotation_updates >= 1,
           "solver.cycles must not be negative; max_cycles and rotation_updates at least 1");
-  expects(solver.precision != Precision::single,
-          "solver.precision \"single\" is a name for a later version; this one has \"double\" and "
-          "\"mixed\"");
+  expects(
+      solver.precision != Precision::single,
+      "solver.precision \"single\": a solution in single precision cannot reach the tolerance of "
+      "most bodies; \"mixed\" does, and costs hardly more, or take \"double\"");
   expects(solver.coarsest_vertices >= 1 && solver.max_levels >= 0,
           "solver.coarsest_vertices must be at least 1, max_levels not negative");
 }

@@ -111,7 +111,8 @@ class DeviceBackend final : public Backend {
   bool can_update() const noexcept override { return options_.updates; }
   void update(const Hierarchy& hierarchy, const HierarchyChange& change) override;
   void set_smoother(const SmootherOptions& options) override;
-  int add_vector() override;
+  int add_vector() override { return append_vector(true); }
+  int add_rough_vector() override { return append_vector(!kMixed); }
 
   void set_operator(const OperatorScale& scale) override;
   void rotate_cells(int displacement) override;
@@ -133,6 +134,10 @@ class DeviceBackend final : public Backend {
   void precondition_jacobi(int level, int in, int out) override;
   bool run_cycle(const CycleOptions& options) override;
 
+  ConjugateVectors conjugate_vectors() override {
+    return {kRight, add_rough_vector(), add_rough_vector(), kMixed};
+  }
+  double true_residual(int b, int x, int r) override;
   std::array<double, 2> dots(int x, int y, int z) override;
   bool advance_conjugate(int z, int d, int q, int x, int r, ConjugateState& state) override;
 
@@ -172,7 +177,11 @@ class DeviceBackend final : public Backend {
   DeviceLevel<Device, S>& level_at(int l) const { return levels_[at(l)]; }
   bool has_vector(int level, int x) const { return levels_[at(level)].vectors[at(x)].size() > 0; }
   const Vector& vector_at(int level, int x) const;
-  S* cycle_vector(int level, int x) const { return vector_at(level, x).template in<S>(); }
+  S* cycle_vector(int level, int x) const {
+    const Vector& vector = vector_at(level, x);
+    ensures(!kMixed || !vector.is_exact, "a vector of the cycle is asked for, and this one is not");
+    return vector.template in<S>();
+  }
   double* exact_vector(int x) const {
     ensures(vector_at(0, x).is_exact, "a force is asked for in a vector of the cycle");
     return vector_at(0, x).doubled.data();
@@ -195,6 +204,7 @@ class DeviceBackend final : public Backend {
   // device_values.hpp
   template <class T>
   FinestView<T> finest_view(const Scale* scale) const;
+  int append_vector(bool exact);
   void fit_to_levels();
   void grow_vectors(DeviceLevel<Device, S>& level, std::size_t before);
   void upload_factors(DeviceLevel<Device, S>& level);
@@ -250,7 +260,7 @@ class DeviceBackend final : public Backend {
   DeviceArray<Device, Scale> scales_;                   // of the operator, and of apply_scaled
   mutable std::vector<DeviceLevel<Device, S>> levels_;  // vectors are made when they are read
   DeviceBlocks<Device> blocks_;                         // of level 0
-  int vectors_on_finest_ = kLevelVectors;
+  std::vector<bool> added_exact_;                       // of the vectors of level 0 that were added
   DeviceArray<Device, double> records_;  // of the cells of one level, of either type; of level 0
                                          // only without blocks
   DeviceArray<Device, double> partial_;  // sums of lanes

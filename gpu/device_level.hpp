@@ -45,6 +45,12 @@ struct DeviceVector {
     single.reset();
     doubled.reset();
   }
+  void assign(std::size_t size) {
+    if (is_exact)
+      doubled.assign(size);
+    else
+      single.assign(size);
+  }
   void reserve(std::size_t size) {
     if (is_exact)
       doubled.reserve(size);

@@ -57,15 +57,12 @@ NearCells DeviceBackend<Device, S>::find_near(int displacement, const BladeReach
   const VertexPlaces places = vertex_places(displacement);
   find_bounds(places, out);
 
-  std::vector<BladeSlab> slabs;
-  for (const BladeReach::Slab& s : reach.slabs())
-    slabs.push_back({s.box.lo, s.box.hi, s.normal, s.point});
-  const ReachView view{reach.box().lo,  reach.box().hi,      reach.margin(),
-                       count_of(slabs), staging_.put(slabs), BladeReach::kBeyond};
+  kernels::BladeNeighbourhood blade = reach.neighbourhood();
+  blade.slab = staging_.put(reach.slabs());
   const std::int32_t cells = levels_[0].cells(), words = (cells + 31) / 32;
   marks_.assign(std::max(at(cells), opened.size()));
   words_.assign(at(words));
-  run(cells, MarkNear{levels_[0].view(), places, view, nullptr, marks_.data()});
+  run(cells, MarkNear{levels_[0].view(), places, blade, 0, nullptr, marks_.data()});
   run(words, PackMarks{cells, marks_.data(), words_.data()});
   std::vector<std::uint32_t> bits(at(words));
   words_.read(0, bits);
@@ -75,8 +72,8 @@ NearCells DeviceBackend<Device, S>::find_near(int displacement, const BladeReach
 
   std::vector<std::int32_t> met;
   if (!opened.empty()) {
-    run(count_of(opened),
-        MarkNear{levels_[0].view(), places, view, other_staging_.put(opened), marks_.data()});
+    run(count_of(opened), MarkNear{levels_[0].view(), places, blade, BladeReach::kBeyond,
+                                   other_staging_.put(opened), marks_.data()});
     std::vector<std::uint8_t> marks(opened.size());
     marks_.read(0, marks);
     for (std::size_t i = 0; i < opened.size(); ++i)

@@ -88,9 +88,9 @@ void DeviceBackend<Device, S>::load(const Hierarchy& hierarchy) {
   for (std::size_t l = 0; l < levels_.size(); ++l) {
     DeviceLevel<Device, S>& level = levels_[l];
     level.structure.load(hierarchy.levels[l]);
-    const int count = l == 0 ? vectors_on_finest_ : static_cast<int>(kLevelVectors);
-    while (static_cast<int>(level.vectors.size()) < count)
-      level.vectors.emplace_back(*device_, std::ssize(level.vectors) >= kLevelVectors);
+    while (level.vectors.size() < at(kLevelVectors)) level.vectors.emplace_back(*device_, false);
+    while (l == 0 && level.vectors.size() < at(kLevelVectors) + added_exact_.size())
+      level.vectors.emplace_back(*device_, added_exact_[level.vectors.size() - at(kLevelVectors)]);
     grow_vectors(level, 0);
   }
   if (options_.blocks) blocks_.load(hierarchy.levels[0], levels_[0].view());
@@ -103,7 +103,10 @@ void DeviceBackend<Device, S>::grow_vectors(DeviceLevel<Device, S>& level, std::
   const auto size = static_cast<std::size_t>(level.scalars());
   for (Vector& vector : level.vectors) {
     if (vector.size() == 0) continue;
-    vector.resize(size);
+    if (before == 0)
+      vector.assign(size);
+    else
+      vector.resize(size);
     vector.with([&](auto* x) {
       run(static_cast<std::int32_t>(size - before),
           ZeroBody<std::decay_t<decltype(*x)>>{x + before});
@@ -185,9 +188,10 @@ void DeviceBackend<Device, S>::update(const Hierarchy& hierarchy, const Hierarch
 }
 
 template <class Device, class S>
-int DeviceBackend<Device, S>::add_vector() {
-  if (!levels_.empty()) levels_[0].vectors.emplace_back(*device_, true);
-  return vectors_on_finest_++;
+int DeviceBackend<Device, S>::append_vector(bool exact) {
+  if (!levels_.empty()) levels_[0].vectors.emplace_back(*device_, exact);
+  added_exact_.push_back(exact);
+  return kLevelVectors + static_cast<int>(added_exact_.size()) - 1;
 }
 
 template <class Device, class S>

@@ -60,32 +60,37 @@ double DeviceBackend<Device, S>::dot(int level, int x, int y) {
   return read_sums<1>()[0];
 }
 
+/// In double, rounded in the end. What is summed is the residual as it is stored.
+template <class Device, class S>
+double DeviceBackend<Device, S>::true_residual(int b, int x, int r) {
+  multiply<double>(0, exact_vector(x), ResidualTo<double, S>{exact_vector(b), cycle_vector(0, r)});
+  return std::sqrt(dot(0, r, r));
+}
+
 template <class Device, class S>
 std::array<double, 2> DeviceBackend<Device, S>::dots(int x, int y, int z) {
-  const std::int32_t size = level_at(0).scalars();
-  vector_at(0, x).with([&](const auto* a) {
-    sum(size, TwoDotTerms<std::decay_t<decltype(*a)>, double>{a, exact_vector(y), exact_vector(z)},
-        StoreSums<2>{totals_.data()});
-  });
+  sum(level_at(0).scalars(),
+      TwoDotTerms<S, S>{cycle_vector(0, x), cycle_vector(0, y), cycle_vector(0, z)},
+      StoreSums<2>{totals_.data()});
   return read_sums<2>();
 }
 
-/// The numbers of the step stay on the device; they come back once, behind it.
+/// The numbers of the step stay on the device; they come back once, behind it. The product is that
+/// of the direction as it is stored, in double, and rounded only in the end: its error is then
+/// relative to itself, and does not grow with the condition of the matrix.
 template <class Device, class S>
 bool DeviceBackend<Device, S>::advance_conjugate(int z, int d, int q, int x, int r,
                                                  ConjugateState& state) {
   const std::int32_t size = level_at(0).scalars();
   ConjugateScalars* const s = conjugate_.data();
-  double *direction = exact_vector(d), *product = exact_vector(q), *residual = exact_vector(r);
-  vector_at(0, z).with([&](const auto* from) {
-    using From = std::decay_t<decltype(*from)>;
-    sum(size, TwoDotTerms<From, double>{from, residual, product},
-        ConjugateDirection{s, state.first});
-    run(size, CombineBody<From, double>{{1}, {0, &s->beta}, from, direction});
-  });
-  apply(0, d, q);
-  sum(size, TwoDotTerms<double, double>{direction, product, residual}, ConjugateStep{s});
-  sum(size, AdvanceTerms{{0, &s->alpha}, direction, product, exact_vector(x), residual},
+  const S* const from = cycle_vector(0, z);
+  S *direction = cycle_vector(0, d), *product = cycle_vector(0, q), *left = cycle_vector(0, r);
+  sum(size, TwoDotTerms<S, S>{from, left, product}, ConjugateDirection{s, state.first});
+  run(size, CombineBody<S, S>{{1}, {0, &s->beta}, from, direction});
+  gather_finest<double>(FinestCells<double, S>{finest_view<double>(scales_.data()), direction},
+                        SumTo<double, S>{product, true});
+  sum(size, TwoDotTerms<S, S>{direction, product, left}, ConjugateStep{s});
+  sum(size, AdvanceTerms<S>{{0, &s->alpha}, direction, product, exact_vector(x), left},
       StoreSums<1>{&s->residual2});
   ConjugateScalars out;
   conjugate_.read(0, {&out, 1});

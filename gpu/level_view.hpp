@@ -149,6 +149,12 @@ KERF_HD void store(T* x, std::int32_t vertex, const Vec3<T>& value) {
   at[2] = value.z;
 }
 
+/// In another precision.
+template <class To, class From>
+KERF_HD Vec3<To> as(const Vec3<From>& v) {
+  return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
+}
+
 /// Zero in held components.
 template <class T>
 KERF_HD Vec3<T> masked(Vec3<T> v, std::uint8_t fixed) {
@@ -158,10 +164,10 @@ KERF_HD Vec3<T> masked(Vec3<T> v, std::uint8_t fixed) {
 }
 
 /// The vertices of a cell.
-template <class T>
-KERF_HD void load_slots(const LevelView& level, std::int32_t cell, const T* x,
+template <class From, class T>
+KERF_HD void load_slots(const LevelView& level, std::int32_t cell, const From* x,
                         Vec3<T> (&out)[kCorners]) {
-  for (int i = 0; i < kCorners; ++i) out[i] = load(x, level.slot(cell, i));
+  for (int i = 0; i < kCorners; ++i) out[i] = as<T>(load(x, level.slot(cell, i)));
 }
 
 template <class T>

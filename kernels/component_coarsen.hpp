@@ -127,36 +127,14 @@ KERF_HD void component_parent(const T (&c)[10][kCorners], const T (&unit_mass)[4
   modes_to_corners(out);
 }
 
-/// One axis of v = P^T v, from the corners of a child in the low or high half to its parent's.
-template <int bit, class T>
-KERF_HD void restrict_axis(bool is_high, T (&v)[kCorners]) {
-  unrolled<kCorners>([&](auto l) {
-    if constexpr ((l & bit) == 0) {
-      constexpr int kHigh = l | bit;
-      if (is_high) {
-        v[l] *= T(0.5);
-        v[kHigh] += v[l];
-      } else {
-        v[kHigh] *= T(0.5);
-        v[l] += v[kHigh];
-      }
-    }
-  });
-}
-
 /// A = P^T A P of a child without hanging corners in a parent without: axis by axis, in place.
 template <class T>
 KERF_HD void restrict_component(int place, T (&A)[kCorners][kCorners]) {
-  const auto all = [&](T(&v)[kCorners]) {
-    restrict_axis<1>((place & 1) != 0, v);
-    restrict_axis<2>((place & 2) != 0, v);
-    restrict_axis<4>((place & 4) != 0, v);
-  };
-  unrolled<kCorners>([&](auto p) { all(A[p]); });
+  unrolled<kCorners>([&](auto p) { restrict_plain(place, A[p]); });
   unrolled<kCorners>([&](auto n) {
     T column[kCorners];
     unrolled<kCorners>([&](auto p) { column[p] = A[p][n]; });
-    all(column);
+    restrict_plain(place, column);
     unrolled<kCorners>([&](auto m) { A[m][n] = column[m]; });
   });
 }

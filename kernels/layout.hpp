@@ -80,4 +80,11 @@ KERF_HD CellEntries<T> cell_entries(T* tiles, std::size_t cell, std::size_t entr
   return {tiles + tile_index(cell, 0, entries, tile_log2), std::size_t{1} << tile_log2};
 }
 
+/// Coordinates of a lattice point in its key: so many bits each, x lowest.
+inline constexpr int kLatticeBits = 21;
+KERF_HD constexpr std::int32_t lattice_coordinate(std::uint64_t key, int axis) {
+  constexpr std::uint64_t kMask = (std::uint64_t{1} << kLatticeBits) - 1;
+  return static_cast<std::int32_t>(key >> (kLatticeBits * axis) & kMask);
+}
+
 }  // namespace kerf::kernels

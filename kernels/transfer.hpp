@@ -23,6 +23,7 @@
 
 #include "kernels/layout.hpp"
 #include "kernels/mat3.hpp"
+#include "kernels/unrolled.hpp"
 
 namespace kerf::kernels {
 
@@ -131,6 +132,32 @@ KERF_HD void transfer_weights(FoldCode child, int place, FoldCode parent,
       w[i][m] = mean * sum;
     }
   }
+}
+
+/// One axis of v = P^T v, from the corners of a child in the low or high half to its parent's.
+template <int bit, class T>
+KERF_HD void restrict_axis(bool is_high, T (&v)[kCorners]) {
+  unrolled<kCorners>([&](auto l) {
+    if constexpr ((l & bit) == 0) {
+      constexpr int kHigh = l | bit;
+      if (is_high) {
+        v[l] *= T(0.5);
+        v[kHigh] += v[l];
+      } else {
+        v[kHigh] *= T(0.5);
+        v[l] += v[kHigh];
+      }
+    }
+  });
+}
+
+/// v = P^T v of a child without hanging corners in a parent without, axis by axis: what
+/// transfer_weights gives, for one component.
+template <class T>
+KERF_HD void restrict_plain(int place, T (&v)[kCorners]) {
+  restrict_axis<1>((place & 1) != 0, v);
+  restrict_axis<2>((place & 2) != 0, v);
+  restrict_axis<4>((place & 4) != 0, v);
 }
 
 }  // namespace kerf::kernels

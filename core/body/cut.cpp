@@ -453,35 +453,26 @@ BladeReach::BladeReach(const TriangleMesh& blade, const Vec3d& origin) {
   for (std::size_t t = 0; t < blade.triangles.size() && blade.triangles.size() <= kFewTriangles;
        ++t) {
     Vec3d p[3];
-    Slab slab;
+    Box3 box;
     for (std::size_t i = 0; i < 3; ++i) {
       p[i] = blade.points[static_cast<std::size_t>(blade.triangles[t][i])] - origin;
-      slab.box.add(p[i]);
+      box.add(p[i]);
     }
-    inflate(slab.box, margin_);
+    inflate(box, margin_);
     const Vec3d n = cross(p[1] - p[0], p[2] - p[0]);
     // A normal of a needle is mostly rounding, and one of zero lets all pass.
-    const double area = norm(n), longest = largest(slab.box.extent());
-    slab.normal = area > 1e-6 * longest * longest ? (1 / area) * n : Vec3d{};
-    slab.point = p[0];
-    slabs_.push_back(slab);
+    const double area = norm(n), longest = largest(box.extent());
+    const bool is_needle = !(area > 1e-6 * longest * longest);
+    slabs_.push_back({box.lo, box.hi, is_needle ? Vec3d{} : (1 / area) * n, p[0]});
   }
 }
 
-bool BladeReach::may_meet(Box3 leaf, bool has_cut_links) const {
-  if (has_cut_links) {
-    const Vec3d beyond = kBeyond * leaf.extent();
-    leaf = {leaf.lo - beyond, leaf.hi + beyond};
-  }
-  if (!leaf.overlaps(box_)) return false;
-  return slabs_.empty() || std::any_of(slabs_.begin(), slabs_.end(), [&](const Slab& slab) {
-           if (!leaf.overlaps(slab.box)) return false;
-           const Vec3d to_center = 0.5 * leaf.lo + 0.5 * leaf.hi - slab.point;
-           double reach = margin_;
-           for (int d = 0; d < 3; ++d)
-             reach += 0.5001 * std::abs(slab.normal[d]) * (leaf.hi[d] - leaf.lo[d]);
-           return std::abs(dot(slab.normal, to_center)) <= reach;
-         });
+kernels::BladeNeighbourhood BladeReach::neighbourhood() const {
+  return {box_.lo, box_.hi, margin_, static_cast<std::int32_t>(slabs_.size()), slabs_.data()};
+}
+
+bool BladeReach::may_meet(const Box3& leaf, bool has_cut_links) const {
+  return kernels::may_meet(neighbourhood(), leaf.lo, leaf.hi, has_cut_links ? kBeyond : 0);
 }
 
 CutEvent cut(LinkedOctree& body, std::span<const Vec3d> corners, const TriangleMesh& blade,

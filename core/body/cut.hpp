@@ -12,6 +12,7 @@
 #include "core/base/workers.hpp"
 #include "core/body/linked_octree.hpp"
 #include "core/geometry/triangle_mesh.hpp"
+#include "kernels/blade_reach.hpp"
 
 namespace kerf {
 
@@ -49,22 +50,17 @@ class BladeReach {
   /// Positions that are tested count from `origin`.
   explicit BladeReach(const TriangleMesh& blade, const Vec3d& origin = {});
 
-  /// The neighbourhood of a triangle.
-  struct Slab {
-    Box3 box;
-    Vec3d normal, point;  ///< of its plane; a normal of zero: all in the box
-  };
-
   const Box3& box() const { return box_; }
-  double margin() const { return margin_; }
-  std::span<const Slab> slabs() const { return slabs_; }
+  std::span<const kernels::BladeSlab> slabs() const { return slabs_; }
+  /// For a loop elsewhere, which may put the slabs where it reads them.
+  kernels::BladeNeighbourhood neighbourhood() const;
   /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met.
-  bool may_meet(Box3 leaf, bool has_cut_links) const;
+  bool may_meet(const Box3& leaf, bool has_cut_links) const;
 
  private:
   Box3 box_;
   double margin_ = 0;
-  std::vector<Slab> slabs_;  // around triangles; none: too many to look at
+  std::vector<kernels::BladeSlab> slabs_;  // around triangles; none: too many to look at
 };
 
 /// Cuts `body` with `blade`.

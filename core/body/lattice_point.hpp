@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "core/geometry/vec.hpp"
+#include "kernels/layout.hpp"
 
 namespace kerf {
 
@@ -19,15 +20,14 @@ class LatticePoint {
              static_cast<std::uint64_t>(p[2]) << (2 * kBits)) {}
   operator Vec3i() const { return {(*this)[0], (*this)[1], (*this)[2]}; }  // NOLINT
   std::int32_t operator[](std::size_t axis) const {
-    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
-    return static_cast<std::int32_t>(key_ >> (kBits * axis) & kMask);
+    return kernels::lattice_coordinate(key_, static_cast<int>(axis));
   }
   /// The coordinates, 21 bits each, x lowest.
   std::uint64_t key() const { return key_; }
   friend bool operator==(const LatticePoint&, const LatticePoint&) = default;
 
  private:
-  static constexpr int kBits = 21;
+  static constexpr int kBits = kernels::kLatticeBits;
   std::uint64_t key_ = 0;
 };
 

@@ -1,59 +1,18 @@
 // SPDX-License-Identifier: MIT
 //
 // What a blade may meet: where vertices are, and marks on cells. As near_cells in
-// core/levels/corners.hpp and BladeReach in core/body/cut.hpp, with the same roundings.
+// core/levels/corners.hpp, with the same roundings.
 #pragma once
 
 #include <limits>
 
 #include "gpu/level_view.hpp"
+#include "kernels/blade_reach.hpp"
+#include "kernels/layout.hpp"
 
 namespace kerf::gpu {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// A box and, of the neighbourhood of a triangle, the plane in it.
-struct BladeSlab {
-  Vec3<double> lo, hi, normal, point;
-};
-
-struct ReachView {
-  Vec3<double> lo, hi;
-  double margin;
-  std::int32_t slabs;
-  const BladeSlab* slab;
-  double beyond;  ///< how far links that were cut may reach, in extents of their cell
-
-  static KERF_HD bool overlap(const Vec3<double>& lo, const Vec3<double>& hi,
-                              const Vec3<double>& other_lo, const Vec3<double>& other_hi) {
-    for (int d = 0; d < 3; ++d)
-      if (!(lo[d] <= other_hi[d] && other_lo[d] <= hi[d])) return false;
-    return true;
-  }
-  /// Whether links of a cell whose vertices lie in a box may be met.
-  KERF_HD bool may_meet(Vec3<double> box_lo, Vec3<double> box_hi, bool has_cut_links) const {
-    if (has_cut_links) {
-      const Vec3<double> by = beyond * (box_hi - box_lo);
-      box_lo = box_lo - by;
-      box_hi = box_hi + by;
-    }
-    if (!overlap(box_lo, box_hi, lo, hi)) return false;
-    bool meets = slabs == 0;
-    for (std::int32_t k = 0; k < slabs && !meets; ++k) {
-      const BladeSlab& s = slab[k];
-      if (!overlap(box_lo, box_hi, s.lo, s.hi)) continue;
-      const Vec3<double> to_center = 0.5 * box_lo + 0.5 * box_hi - s.point;
-      double reach = margin, distance = 0;
-      for (int d = 0; d < 3; ++d) {
-        const double n = s.normal[d];
-        reach += 0.5001 * (n < 0 ? -n : n) * (box_hi[d] - box_lo[d]);
-        distance += n * to_center[d];
-      }
-      meets = (distance < 0 ? -distance : distance) <= reach;
-    }
-    return meets;
-  }
-};
 
 /// Positions of vertices of level 0, from the origin of the lattice, m.
 struct VertexPlaces {
@@ -62,12 +21,10 @@ struct VertexPlaces {
   const double* displacement;
 
   KERF_HD Vec3<double> at(std::int32_t vertex) const {
-    constexpr int kBits = 21;
-    constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
     const Vec3<double> u = load(displacement, vertex);
     Vec3<double> out;
     for (int d = 0; d < 3; ++d)
-      out[d] = static_cast<double>(key[vertex] >> (kBits * d) & kMask) * spacing + u[d];
+      out[d] = kernels::lattice_coordinate(key[vertex], d) * spacing + u[d];
     return out;
   }
 };
@@ -116,12 +73,13 @@ struct FoldBounds {
   }
 };
 
-/// A byte a cell: whether it may be met. `cells`: numbers, of such as have cut links; null: all, as
-/// if they had none.
+/// A byte a cell: whether it may be met, or what lies `beyond` it, in its extents. `cells`:
+/// numbers; null: all.
 struct MarkNear {
   LevelView level;
   VertexPlaces places;
-  ReachView reach;
+  kernels::BladeNeighbourhood blade;
+  double beyond;
   const std::int32_t* cells;
   std::uint8_t* marks;
 
@@ -135,7 +93,7 @@ struct MarkNear {
         hi[d] = p[d] > hi[d] ? p[d] : hi[d];
       }
     }
-    marks[i] = reach.may_meet(lo, hi, cells != nullptr) ? 1 : 0;
+    marks[i] = kernels::may_meet(blade, lo, hi, beyond) ? 1 : 0;
   }
 };
 /// 32 marks to a word.

@@ -10,8 +10,8 @@
 
 #include "gpu/bodies/values.hpp"
 #include "gpu/bodies/vectors.hpp"
-#include "kernels/component_coarsen.hpp"
 #include "kernels/relax.hpp"
+#include "kernels/transfer.hpp"
 
 namespace kerf::gpu {
 
@@ -35,11 +35,11 @@ KERF_HD void finest_product(const LevelView& level, const FinestView<T>& finest,
   kernels::fold_transpose(corners, fold, f);
 }
 
-/// Products of cells of level 0 with u.
-template <class T>
+/// Products of cells of level 0 with u, which may be of another precision.
+template <class T, class From = T>
 struct FinestCells {
   FinestView<T> finest;
-  const T* u;
+  const From* u;
 
   KERF_HD void forces(const LevelView& level, std::int32_t cell, Vec3<T> (&f)[kCorners]) const {
     load_slots(level, cell, u, f);
@@ -96,24 +96,24 @@ struct RecordCell {
 // ---- what becomes of the sum at a vertex -------------------------------------------------------
 
 /// out = the sum.
-template <class T>
+template <class T, class To = T>
 struct SumTo {
-  T* out;
+  To* out;
   bool masks;
 
   KERF_HD void operator()(const LevelView& level, std::int32_t vertex, const Vec3<T>& sum) const {
-    store(out, vertex, masks ? masked(sum, level.fixed[vertex]) : sum);
+    store(out, vertex, as<To>(masks ? masked(sum, level.fixed[vertex]) : sum));
   }
 };
 
 /// r = f - the sum.
-template <class T>
+template <class T, class To = T>
 struct ResidualTo {
   const T* f;
-  T* r;
+  To* r;
 
   KERF_HD void operator()(const LevelView& level, std::int32_t vertex, const Vec3<T>& sum) const {
-    store(r, vertex, load(f, vertex) - masked(sum, level.fixed[vertex]));
+    store(r, vertex, as<To>(load(f, vertex) - masked(sum, level.fixed[vertex])));
   }
 };
 
@@ -170,10 +170,7 @@ struct JacobiBody {
   To* out;
 
   KERF_HD void operator()(std::int32_t vertex) const {
-    const Vec3<From> r = load(in, vertex);
-    const Vec3<T> z =
-        inverse[vertex] * Vec3<T>{static_cast<T>(r.x), static_cast<T>(r.y), static_cast<T>(r.z)};
-    store(out, vertex, Vec3<To>{static_cast<To>(z.x), static_cast<To>(z.y), static_cast<To>(z.z)});
+    store(out, vertex, as<To>(inverse[vertex] * as<T>(load(in, vertex))));
   }
 };
 
@@ -301,9 +298,7 @@ struct RestrictCell {
       v[2][i] = at.z;
     });
     kernels::unrolled<3>([&](auto c) {
-      kernels::restrict_axis<1>((place & 1) != 0, v[c]);
-      kernels::restrict_axis<2>((place & 2) != 0, v[c]);
-      kernels::restrict_axis<4>((place & 4) != 0, v[c]);
+      kernels::restrict_plain(place, v[c]);
       kernels::unrolled<kCorners>([&](auto m) { sum[c][m] += v[c][m]; });
     });
   }

@@ -139,19 +139,21 @@ struct ThreeDotTerms {
 };
 
 /// x += a d, r -= a q, and r.r; where a is zero d and q are not read, for they may be no numbers.
+template <class T>
 struct AdvanceTerms {
   static constexpr int kSums = 1;
   Factor a;
-  const double *d, *q;
-  double *x, *r;
+  const T *d, *q;
+  double* x;
+  T* r;
 
   KERF_HD void add(std::int32_t i, double (&sum)[kSums]) const {
     const double step = a.get();
-    double left = r[i];
+    auto left = static_cast<double>(r[i]);
     if (step != 0) {
-      x[i] += step * d[i];
-      left -= step * q[i];
-      r[i] = left;
+      x[i] += step * static_cast<double>(d[i]);
+      left -= step * static_cast<double>(q[i]);
+      r[i] = static_cast<T>(left);
     }
     sum[0] += left * left;
   }

@@ -160,7 +160,7 @@ TEST(Vectors, NothingIsReadWhereTheFactorIsZero) {
 
   double sum[1] = {};
   double u[] = {5}, r[] = {2};
-  gpu::AdvanceTerms{{0}, y, y, u, r}.add(0, sum);
+  gpu::AdvanceTerms<double>{{0}, y, y, u, r}.add(0, sum);
   EXPECT_EQ(u[0], 5);
   EXPECT_EQ(r[0], 2);
   EXPECT_EQ(sum[0], 4);

@@ -2,6 +2,7 @@
 //
 // Compiled wherever nvcc is found, never run: the headers of kernels/ must be code for a device,
 // templates instantiated, also while no backend calls them there.
+#include "kernels/blade_reach.hpp"
 #include "kernels/coarsen.hpp"
 #include "kernels/component_coarsen.hpp"
 #include "kernels/corner_coarsen.hpp"
