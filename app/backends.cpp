@@ -21,8 +21,10 @@ const char* precision_name(Precision precision) {
 }
 
 std::unique_ptr<Backend> make_backend(const SolverSetup& solver) {
-  expects(solver.precision != Precision::single,
-          "solver.precision = \"single\": there are \"double\" and \"mixed\"");
+  expects(
+      solver.precision != Precision::single,
+      "solver.precision = \"single\": a solution in single precision cannot reach the tolerance "
+      "of most bodies; \"mixed\" does, or take \"double\"");
   const bool mixed = solver.precision == Precision::mixed;
   const bool known = solver.backend == "cpu" || solver.backend == "auto" ||
                      solver.backend == "reference" || solver.backend == "cuda";

@@ -6,7 +6,9 @@
 // together.
 //
 // Device  see device_array.hpp.
-// S       scalar of the cycle. Vectors that are added on level 0 are double, and so are forces.
+// S       scalar of the cycle. Vectors that are added on level 0 are double, but for rough ones,
+// and
+//         so are forces.
 #pragma once
 
 #include <algorithm>

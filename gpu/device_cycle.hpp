@@ -181,9 +181,8 @@ void DeviceBackend<Device, S>::gauss_seidel(int level, SweepOrder order) {
 template <class Device, class S>
 void DeviceBackend<Device, S>::restrict_residual(int fine) {
   const LevelView from = level_at(fine).view(), to = level_at(fine + 1).view();
-  run(to.cells,
-      RestrictCell<S>{from, to, level_at(fine).first_slots.data(), level_at(fine + 1).plain.data(),
-                      cycle_vector(fine, kResidual), records<S>()});
+  run(to.cells, RestrictCell<S>{from, to, level_at(fine).first_slots.data(),
+                                cycle_vector(fine, kResidual), records<S>()});
   const SumTo<S> right{cycle_vector(fine + 1, kRight), true};
   run(to.vertices, GatherVertex<S, SumTo<S>>{to, records<S>(), right});
   zero(fine + 1, kSolution);

@@ -86,7 +86,7 @@ bool DeviceBackend<Device, S>::advance_conjugate(int z, int d, int q, int x, int
   const S* const from = cycle_vector(0, z);
   S *direction = cycle_vector(0, d), *product = cycle_vector(0, q), *left = cycle_vector(0, r);
   sum(size, TwoDotTerms<S, S>{from, left, product}, ConjugateDirection{s, state.first});
-  run(size, CombineBody<S, S>{{1}, {0, &s->beta}, from, direction});
+  run(size, CombineBody<S, S, double>{{1}, {0, &s->beta}, from, direction});
   gather_finest<double>(FinestCells<double, S>{finest_view<double>(scales_.data()), direction},
                         SumTo<double, S>{product, true});
   sum(size, TwoDotTerms<S, S>{direction, product, left}, ConjugateStep{s});

@@ -130,11 +130,11 @@ KERF_HD void component_parent(const T (&c)[10][kCorners], const T (&unit_mass)[4
 /// A = P^T A P of a child without hanging corners in a parent without: axis by axis, in place.
 template <class T>
 KERF_HD void restrict_component(int place, T (&A)[kCorners][kCorners]) {
-  unrolled<kCorners>([&](auto p) { restrict_plain(place, A[p]); });
+  unrolled<kCorners>([&](auto p) { restrict_plain<T>(place, A[p]); });
   unrolled<kCorners>([&](auto n) {
     T column[kCorners];
     unrolled<kCorners>([&](auto p) { column[p] = A[p][n]; });
-    restrict_plain(place, column);
+    restrict_plain<T>(place, column);
     unrolled<kCorners>([&](auto m) { A[m][n] = column[m]; });
   });
 }

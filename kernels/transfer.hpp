@@ -135,16 +135,16 @@ KERF_HD void transfer_weights(FoldCode child, int place, FoldCode parent,
 }
 
 /// One axis of v = P^T v, from the corners of a child in the low or high half to its parent's.
-template <int bit, class T>
-KERF_HD void restrict_axis(bool is_high, T (&v)[kCorners]) {
+template <int bit, class T, class Value>
+KERF_HD void restrict_axis(bool is_high, Value (&v)[kCorners]) {
   unrolled<kCorners>([&](auto l) {
     if constexpr ((l & bit) == 0) {
       constexpr int kHigh = l | bit;
       if (is_high) {
-        v[l] *= T(0.5);
+        v[l] = T(0.5) * v[l];
         v[kHigh] += v[l];
       } else {
-        v[kHigh] *= T(0.5);
+        v[kHigh] = T(0.5) * v[kHigh];
         v[l] += v[kHigh];
       }
     }
@@ -152,12 +152,14 @@ KERF_HD void restrict_axis(bool is_high, T (&v)[kCorners]) {
 }
 
 /// v = P^T v of a child without hanging corners in a parent without, axis by axis: what
-/// transfer_weights gives, for one component.
-template <class T>
-KERF_HD void restrict_plain(int place, T (&v)[kCorners]) {
-  restrict_axis<1>((place & 1) != 0, v);
-  restrict_axis<2>((place & 2) != 0, v);
-  restrict_axis<4>((place & 4) != 0, v);
+/// transfer_weights gives.
+///
+/// Shapes  v: 8 values, of any type that adds and scales (a scalar or a Vec3<T>).
+template <class T, class Value>
+KERF_HD void restrict_plain(int place, Value (&v)[kCorners]) {
+  restrict_axis<1, T>((place & 1) != 0, v);
+  restrict_axis<2, T>((place & 2) != 0, v);
+  restrict_axis<4, T>((place & 4) != 0, v);
 }
 
 }  // namespace kerf::kernels

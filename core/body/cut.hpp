@@ -52,7 +52,7 @@ class BladeReach {
 
   const Box3& box() const { return box_; }
   std::span<const kernels::BladeSlab> slabs() const { return slabs_; }
-  /// For a loop elsewhere, which may put the slabs where it reads them.
+  /// For a loop elsewhere, which may put the slabs where it reads them; valid as long as this.
   kernels::BladeNeighbourhood neighbourhood() const;
   /// Whether links of a leaf whose corners, or vertices, lie in `leaf` may be met.
   bool may_meet(const Box3& leaf, bool has_cut_links) const;

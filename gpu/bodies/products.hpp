@@ -262,12 +262,12 @@ struct MarkFirst {
   }
 };
 
-/// What the children of a coarse cell hand to its slots.
+/// What the children of a coarse cell hand to its slots: to its corners first, all of them, then
+/// those that hang hand on to the slots (kernels/transfer.hpp).
 template <class T>
 struct RestrictCell {
   LevelView fine, coarse;
   const std::uint8_t* first_slots;  ///< of fine cells, MarkFirst
-  const std::uint8_t* plain;        ///< of coarse cells, MarkPlain
   const T* r;
   T* records;
 
@@ -275,44 +275,41 @@ struct RestrictCell {
     Vec3<T> sum[kCorners];
     const std::int32_t begin = coarse.child_begin[cell];
     const std::int32_t end = begin + coarse.child_count[cell];
-    if (plain[cell] != 0) {
-      T by_component[3][kCorners] = {};
-      for (std::int32_t k = begin; k < end; ++k) add_plain(coarse.children[k], by_component);
-      for (int m = 0; m < kCorners; ++m)
-        sum[m] = {by_component[0][m], by_component[1][m], by_component[2][m]};
+    const std::uint16_t fold = coarse.fold[cell];
+    if (fine.place[coarse.children[begin]] == kernels::kPassed) {
+      load_spoken(coarse.children[begin], sum);
     } else {
-      for (std::int32_t k = begin; k < end; ++k) add(coarse.children[k], coarse.fold[cell], sum);
+      for (std::int32_t k = begin; k < end; ++k) add(coarse.children[k], sum);
+      if (kernels::has_hanging(fold)) hand_on(fold, sum);
     }
     store_record(records, cell, sum);
   }
 
  private:
-  KERF_HD void add_plain(std::int32_t child, T (&sum)[3][kCorners]) const {
-    const int bits = first_slots[child], place = fine.place[child];
-    T v[3][kCorners];
-    kernels::unrolled<kCorners>([&](auto i) {
-      const bool speaks = ((bits >> i) & 1) != 0;
-      const Vec3<T> at = speaks ? load(r, fine.slot(child, i)) : Vec3<T>{};
-      v[0][i] = at.x;
-      v[1][i] = at.y;
-      v[2][i] = at.z;
-    });
-    kernels::unrolled<3>([&](auto c) {
-      kernels::restrict_plain(place, v[c]);
-      kernels::unrolled<kCorners>([&](auto m) { sum[c][m] += v[c][m]; });
-    });
-  }
-
-  KERF_HD void add(std::int32_t child, std::uint16_t fold, Vec3<T> (&sum)[kCorners]) const {
+  /// What the slots hold that this cell speaks for.
+  KERF_HD void load_spoken(std::int32_t child, Vec3<T> (&v)[kCorners]) const {
     const int bits = first_slots[child];
-    T w[kCorners][kCorners];
-    kernels::transfer_weights(fine.fold[child], fine.place[child], fold, w);
-    for (int i = 0; i < kCorners; ++i) {
-      if (((bits >> i) & 1) == 0) continue;
-      const Vec3<T> at = load(r, fine.slot(child, i));
-      for (int m = 0; m < kCorners; ++m)
-        if (w[i][m] != T(0)) sum[m] += w[i][m] * at;
-    }
+    kernels::unrolled<kCorners>(
+        [&](auto i) { v[i] = ((bits >> i) & 1) != 0 ? load(r, fine.slot(child, i)) : Vec3<T>{}; });
+  }
+  /// A hanging slot of a child is the corner of its parent.
+  KERF_HD void add(std::int32_t child, Vec3<T> (&sum)[kCorners]) const {
+    const std::uint16_t fold = fine.fold[child];
+    const int place = fine.place[child];
+    Vec3<T> v[kCorners];
+    load_spoken(child, v);
+    kernels::unrolled<kCorners>([&](auto i) {
+      if (!kernels::is_hanging(fold, i)) return;
+      sum[i] += v[i];
+      v[i] = {};
+    });
+    kernels::restrict_plain<T>(place, v);
+    kernels::unrolled<kCorners>([&](auto m) { sum[m] += v[m]; });
+  }
+  KERF_HD void hand_on(std::uint16_t fold, Vec3<T> (&sum)[kCorners]) const {
+    Vec3<T> slots[kCorners];
+    kernels::fold_transpose(sum, fold, slots);
+    kernels::unrolled<kCorners>([&](auto m) { sum[m] = slots[m]; });
   }
 };
 
@@ -327,29 +324,39 @@ struct ProlongVertex {
   KERF_HD void operator()(std::int32_t vertex) const {
     const std::int32_t child = first[vertex] / kCorners, cell = fine.parent[child];
     const int corner = first[vertex] % kCorners, place = fine.place[child];
-    const bool is_plain = place != kernels::kPassed && !kernels::has_hanging(fine.fold[child]) &&
-                          !kernels::has_hanging(coarse.fold[cell]);
-    const Vec3<T> change =
-        is_plain ? mean(cell, place, corner) : weighted(child, cell, place, corner);
+    const Vec3<T> change = place == kernels::kPassed ? load(from, coarse.slot(cell, corner))
+                                                     : mean(child, cell, place, corner);
     store(u, vertex, load(static_cast<const T*>(u), vertex) + masked(change, fine.fixed[vertex]));
   }
 
  private:
-  /// Of the parent's corners between the child's own one and this one.
-  KERF_HD Vec3<T> mean(std::int32_t cell, int place, int corner) const {
+  /// Of the parent's corners between the child's own one and this one; a hanging slot is the corner
+  /// of the parent itself.
+  KERF_HD Vec3<T> mean(std::int32_t child, std::int32_t cell, int place, int corner) const {
+    const std::uint16_t fold = coarse.fold[cell];
+    const int own = kernels::is_hanging(fine.fold[child], corner) ? corner : place;
+    T weight[kCorners];
+    kernels::unrolled<kCorners>([&](auto m) {
+      weight[m] =
+          kernels::is_between(own, corner, m) && !kernels::is_hanging(fold, m) ? T(1) : T(0);
+    });
+    if (kernels::has_hanging(fold)) hand_on(own, corner, fold, weight);
     Vec3<T> sum{};
-    KERF_UNROLL
-    for (int m = 0; m < kCorners; ++m)
-      if (kernels::is_between(place, corner, m)) sum += load(from, coarse.slot(cell, m));
-    return kernels::mean_weight<T>(place ^ corner) * sum;
+    kernels::unrolled<kCorners>([&](auto m) {
+      if (weight[m] != T(0)) sum += weight[m] * load(from, coarse.slot(cell, m));
+    });
+    return kernels::mean_weight<T>(own ^ corner) * sum;
   }
-  KERF_HD Vec3<T> weighted(std::int32_t child, std::int32_t cell, int place, int corner) const {
-    T w[kCorners][kCorners];
-    kernels::transfer_weights(fine.fold[child], place, coarse.fold[cell], w);
-    Vec3<T> sum{};
-    for (int m = 0; m < kCorners; ++m)
-      if (w[corner][m] != T(0)) sum += w[corner][m] * load(from, coarse.slot(cell, m));
-    return sum;
+  /// Adds to the weights of slots what corners that hang are made of.
+  KERF_HD void hand_on(int own, int corner, std::uint16_t fold, T (&weight)[kCorners]) const {
+    const int o = kernels::fold_octant(fold);
+    for (int j = 0; j < kCorners; ++j) {
+      if (!kernels::is_hanging(fold, j) || !kernels::is_between(own, corner, j)) continue;
+      const T share = kernels::mean_weight<T>(j ^ o);
+      kernels::unrolled<kCorners>([&](auto m) {
+        if (kernels::is_between(o, j, m)) weight[m] += share;
+      });
+    }
   }
 };
 

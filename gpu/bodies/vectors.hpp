@@ -37,17 +37,17 @@ struct Factor {
   KERF_HD double get() const { return at != nullptr ? *at : value; }
 };
 
-/// y = a x + b y; y is not read where b is zero.
-template <class From, class To>
+/// y = a x + b y, computed in T; y is not read where b is zero.
+template <class From, class To, class T = To>
 struct CombineBody {
   Factor a, b;
   const From* x;
   To* y;
 
   KERF_HD void operator()(std::int32_t i) const {
-    const To p = static_cast<To>(a.get()), q = static_cast<To>(b.get());
-    const To first = p * static_cast<To>(x[i]);
-    y[i] = q == To(0) ? first : first + q * y[i];
+    const T p = static_cast<T>(a.get()), q = static_cast<T>(b.get());
+    const T first = p * static_cast<T>(x[i]);
+    y[i] = static_cast<To>(q == T(0) ? first : first + q * static_cast<T>(y[i]));
   }
 };
 

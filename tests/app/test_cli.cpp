@@ -121,7 +121,7 @@ TEST_F(KerfCommand, RefusesBadScenes) {
   expect_refused(run_scene(kBlock, "--set material.young=nan"), 2, {"finite"});
   expect_refused(run_scene(kBlock, "--set time.step=0"), 2, {"--set time.step=0"});
   expect_refused(run_scene(kBlock, "--set solver.precision=single"), 2,
-                 {"--set solver.precision=single: ", "\"double\"", "\"mixed\""});
+                 {"--set solver.precision=single: ", "tolerance", "\"double\"", "\"mixed\""});
   expect_refused(
       run_scene(kBlock, "--set solver.precision=mixed --set solver.smoother=gauss-seidel"), 2,
       {"--set solver.precision=mixed: ", "chebyshev"});

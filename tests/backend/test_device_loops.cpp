@@ -160,10 +160,19 @@ TEST(Vectors, NothingIsReadWhereTheFactorIsZero) {
 
   double sum[1] = {};
   double u[] = {5}, r[] = {2};
-  gpu::AdvanceTerms<double>{{0}, y, y, u, r}.add(0, sum);
+  const double no[] = {nan};
+  gpu::AdvanceTerms<double>{{0}, no, no, u, r}.add(0, sum);
   EXPECT_EQ(u[0], 5);
   EXPECT_EQ(r[0], 2);
   EXPECT_EQ(sum[0], 4);
+
+  const float rough_no[] = {std::nanf("")};
+  float rough_r[] = {3};
+  sum[0] = 0;
+  gpu::AdvanceTerms<float>{{0}, rough_no, rough_no, u, rough_r}.add(0, sum);
+  EXPECT_EQ(u[0], 5);
+  EXPECT_EQ(rough_r[0], 3);
+  EXPECT_EQ(sum[0], 9);
 }
 
 TEST(Ceilings, AreMeasuredOnAnyDevice) {

@@ -5,6 +5,8 @@
 // in which threads run. That its double twin is right is also for test_operators.cpp.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -261,6 +263,99 @@ TEST_P(Parity, OfATrueResidualThatSinglePrecisionNeverSees) {
   EXPECT_LE(found.stats.residual, kFar);
   EXPECT_LE(found.stats.cycles, exact.stats.cycles + 2);
   EXPECT_LE(relative(found.x, exact.x), 1e-8);  // the residual times the condition of the body
+}
+
+TEST_P(Parity, OfGaussSeidelToATrueResidual) {
+  const Problem p = cut_octree();
+  const Solved exact = solve(p, test::make_backend("cpu"), CycleType::v, 1e-9, false);
+  const Solved found = solve(p, machine(), CycleType::v, 1e-9, false);
+
+  EXPECT_TRUE(found.stats.converged);
+  EXPECT_LE(found.stats.cycles, exact.stats.cycles + 2);
+  EXPECT_LE(relative(found.x, exact.x), 1e-6);
+}
+
+// Load and product are nearly the same: what is left of them needs a product in double.
+TEST_P(Parity, OfATrueResidualWhereVectorsNearlyCancel) {
+  constexpr double kSmall = 1e-7;
+  const Problem p = cut_octree();
+  const Loaded exact(p, test::make_backend("cpu"), kDynamic, {}, p.deformation());
+  const Loaded mirror(p, machine(), kDynamic, {}, p.deformation());
+  const int right = exact.extra, solution = exact.extra + 1;
+  const Vector x = p.free_vector(0, 31);
+  test::write(*exact.backend, 0, solution, x);
+  exact.backend->apply(0, solution, right);
+  const Vector product = p.read(*exact.backend, 0, right);
+  const Vector left = kSmall * product.norm() * p.free_vector(0, 32).normalized();
+  Backend& backend = *mirror.backend;
+  test::write(backend, 0, right, product + left);
+  test::write(backend, 0, solution, x);
+
+  const int r = backend.conjugate_vectors().residual;
+  const double norm = backend.true_residual(right, solution, r);
+
+  EXPECT_NEAR(norm, left.norm(), 1e-5 * left.norm());
+  EXPECT_LE(relative(p.read(backend, 0, r), left), kSingle);
+}
+
+// x follows the direction as it is stored, so that r stays what x leaves.
+TEST_P(Parity, OfStepsOfConjugateGradients) {
+  const Problem p = cut_octree();
+  const Loaded mirror(p, machine(), kDynamic, {}, p.deformation());
+  Backend& backend = *mirror.backend;
+  const int b = mirror.extra, x = mirror.extra + 1;
+  const auto [r, d, q, rounded] = backend.conjugate_vectors();
+  EXPECT_EQ(rounded, is_mixed());
+  test::write(backend, 0, b, p.free_vector(0, 33));
+  test::write(backend, 0, x, p.free_vector(0, 34));
+  double greatest = backend.true_residual(b, x, r);
+  const auto step = [&](ConjugateState& state) {
+    backend.copy(0, r, kRight);
+    backend.precondition_jacobi(0, kRight, kSolution);
+    return backend.advance_conjugate(kSolution, d, q, x, r, state);
+  };
+
+  ConjugateState state;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(step(state));
+    const Vector of_recursion = p.read(backend, 0, r);
+    greatest = std::max(greatest, of_recursion.norm());
+    EXPECT_NEAR(std::sqrt(state.residual2), of_recursion.norm(), 1e-6 * greatest);
+    backend.true_residual(b, x, r);
+    EXPECT_LE((p.read(backend, 0, r) - of_recursion).norm(), 0.1 * operators() * greatest);
+    test::write(backend, 0, r, of_recursion);
+  }
+
+  // Of an operator that is not definite nothing is kept.
+  const Vector before_x = p.read(backend, 0, x), before_r = p.read(backend, 0, r);
+  backend.set_operator({-kDynamic.stiffness, -kDynamic.mass});
+  EXPECT_FALSE(step(state));
+  EXPECT_EQ(p.read(backend, 0, x), before_x);
+  EXPECT_EQ(p.read(backend, 0, r), before_r);
+}
+
+TEST_P(Parity, OfVectorsThatKeepTheirPrecisionThroughLoads) {
+  const Problem p = cut_octree();
+  std::unique_ptr<Backend> owner = machine();
+  Backend& backend = *owner;
+  std::vector<int> rough{backend.add_rough_vector()}, exact{backend.add_vector()};
+  const Vector value = p.free_vector(0, 35);
+  for (int load = 0; load < 2; ++load) {
+    backend.load(p.hierarchy);
+    exact.push_back(backend.add_vector());
+    rough.push_back(backend.add_rough_vector());
+    for (const auto* some : {&exact, &rough})
+      for (const int id : *some) {
+        EXPECT_EQ(p.read(backend, 0, id).norm(), 0);
+        test::write(backend, 0, id, value);
+      }
+    for (const int id : exact) EXPECT_EQ(p.read(backend, 0, id), value);
+    for (const int id : rough) {
+      const double off = relative(p.read(backend, 0, id), value);
+      EXPECT_LE(off, 1e-7);
+      EXPECT_EQ(off > 0, is_mixed());
+    }
+  }
 }
 
 // The same bodies in the same order: a GPU rounds as the host does, and again the next time.

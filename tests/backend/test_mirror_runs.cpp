@@ -110,7 +110,7 @@ TEST(MirrorRuns, RecordTheCycleOnceForEachCut) {
 // cell. A small body has more vertices a cell; of those of a large one, as many as cells, 0.95 is
 // left.
 TEST(MirrorRuns, TakeFewBytesACell) {
-  constexpr double kMost = 730 / 0.95;
+  constexpr double kMost = 735;
   SimulationSetup setup = block(0);
   setup.body = {test::box_solid({1, 1, 1}), 32, 0};
   setup.surface = SurfaceMethod::none;
