@@ -107,8 +107,7 @@ TEST(MirrorRuns, RecordTheCycleOnceForEachCut) {
 }
 
 // 200 million cells are to fit into 139 GiB, with 2 per cent for the coarsest level: 730 bytes a
-// cell. A small body has more vertices a cell; of those of a large one, as many as cells, 0.95 is
-// left.
+// cell. This small body has more vertices a cell than a large one, and takes 732.
 TEST(MirrorRuns, TakeFewBytesACell) {
   constexpr double kMost = 735;
   SimulationSetup setup = block(0);
